@@ -1,0 +1,24 @@
+#![doc = include_str!("../README.md")]
+
+mod brick;
+mod camera;
+mod grid;
+mod image;
+mod layout;
+mod ray;
+mod scalar;
+mod space;
+mod transfer;
+mod volume;
+
+pub use brick::{BrickId, Cut, CutError, Level};
+pub use camera::{Camera, CameraError, PixelRays, Projection};
+pub use glam;
+pub use grid::{Grid, GridError};
+pub use image::{Image, ImageSizeError};
+pub use layout::{BrickLayout, BrickSide, BrickSideError};
+pub use ray::{Aabb, Ray, Span};
+pub use scalar::{Scalar, ScalarType, Voxels};
+pub use space::{IndexPos, SamplePos, WorldPos};
+pub use transfer::{Knot, LinearRgb, Optics, TransferError, TransferFunction};
+pub use volume::{NonFinite, ValueRange, Volume, VolumeError};

@@ -1,0 +1,154 @@
+//! A scalar volume.
+
+use crate::{Grid, Scalar, ScalarType, Voxels, with_voxels};
+
+/// A scalar volume: voxels in their native type, and where they lie.
+///
+/// All values are finite: [`Volume::new`] replaces what is not, and counts it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Volume {
+    grid: Grid,
+    voxels: Voxels,
+    range: ValueRange,
+    non_finite: NonFinite,
+}
+
+/// A closed interval of data values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub struct ValueRange {
+    pub min: f64,
+    pub max: f64,
+}
+
+impl ValueRange {
+    /// The smallest range around both.
+    pub fn union(self, other: ValueRange) -> ValueRange {
+        ValueRange { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// Whether `value` lies in the range.
+    pub fn contains(self, value: f64) -> bool {
+        self.min <= value && value <= self.max
+    }
+}
+
+/// How many voxels of a volume were not finite, and have been replaced.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub struct NonFinite {
+    pub n_nan: usize,
+    pub n_positive_infinity: usize,
+    pub n_negative_infinity: usize,
+}
+
+impl NonFinite {
+    /// Number of voxels that were replaced.
+    pub fn total(self) -> usize {
+        self.n_nan + self.n_positive_infinity + self.n_negative_infinity
+    }
+}
+
+/// Voxels that do not fill the grid.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{n_voxels} voxels do not fill a grid of {} x {} x {}", dims.x, dims.y, dims.z)]
+#[allow(missing_docs)]
+pub struct VolumeError {
+    pub dims: glam::UVec3,
+    pub n_voxels: usize,
+}
+
+impl Volume {
+    /// A volume of `voxels` (x fastest) on `grid`.
+    ///
+    /// NaN and -infinity become the least finite value, +infinity the greatest (0 where no voxel is finite);
+    /// [`non_finite`](Self::non_finite) counts them.
+    ///
+    /// # Errors
+    /// If the voxels do not fill the grid.
+    pub fn new(grid: Grid, voxels: impl Into<Voxels>) -> Result<Volume, VolumeError> {
+        let mut voxels = voxels.into();
+        if voxels.len() != grid.n_voxels() {
+            return Err(VolumeError { dims: grid.dims(), n_voxels: voxels.len() });
+        }
+        let range = with_voxels!(&voxels, v => finite_range(v));
+        let non_finite = match &mut voxels {
+            Voxels::F32(v) => replace_non_finite(v, range),
+            Voxels::F64(v) => replace_non_finite(v, range),
+            _ => NonFinite::default(),
+        };
+        Ok(Volume { grid, voxels, range, non_finite })
+    }
+
+    /// Where the voxels lie.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// The voxels, x fastest.
+    pub fn voxels(&self) -> &Voxels {
+        &self.voxels
+    }
+
+    /// The native scalar type.
+    pub fn scalar_type(&self) -> ScalarType {
+        self.voxels.scalar_type()
+    }
+
+    /// Least and greatest value.
+    pub fn range(&self) -> ValueRange {
+        self.range
+    }
+
+    /// What was not finite in the voxels handed to [`Volume::new`].
+    pub fn non_finite(&self) -> NonFinite {
+        self.non_finite
+    }
+}
+
+fn finite_range<T: Scalar>(values: &[T]) -> ValueRange {
+    let mut lanes = values.iter().map(|v| v.to_f64()).filter(|v| v.is_finite());
+    let Some(first) = lanes.next() else { return ValueRange { min: 0.0, max: 0.0 } };
+    lanes.fold(ValueRange { min: first, max: first }, |r, v| ValueRange { min: r.min.min(v), max: r.max.max(v) })
+}
+
+fn replace_non_finite<T: Scalar>(values: &mut [T], range: ValueRange) -> NonFinite {
+    let mut counts = NonFinite::default();
+    for v in values {
+        let x = v.to_f64();
+        if x.is_finite() {
+            continue;
+        }
+        let (count, value) = if x.is_nan() {
+            (&mut counts.n_nan, range.min)
+        } else if x > 0.0 {
+            (&mut counts.n_positive_infinity, range.max)
+        } else {
+            (&mut counts.n_negative_infinity, range.min)
+        };
+        *count += 1;
+        *v = T::from_f64(value);
+    }
+    counts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DVec3, UVec3};
+
+    #[test]
+    fn non_finite_values_are_replaced_and_counted() {
+        let grid = Grid::axis_aligned(UVec3::new(5, 1, 1), DVec3::ONE).unwrap();
+        let volume = Volume::new(grid, vec![f32::NAN, -2.0, f32::INFINITY, 3.0, f32::NEG_INFINITY]).unwrap();
+        assert_eq!(volume.voxels(), &Voxels::F32(vec![-2.0, -2.0, 3.0, 3.0, -2.0]));
+        assert_eq!(volume.non_finite(), NonFinite { n_nan: 1, n_positive_infinity: 1, n_negative_infinity: 1 });
+        assert_eq!(volume.range(), ValueRange { min: -2.0, max: 3.0 });
+    }
+
+    #[test]
+    fn voxels_must_fill_the_grid() {
+        let grid = Grid::axis_aligned(UVec3::new(2, 2, 2), DVec3::ONE).unwrap();
+        assert_eq!(Volume::new(grid, vec![0u8; 7]).unwrap_err().to_string(), "7 voxels do not fill a grid of 2 x 2 x 2");
+    }
+}
