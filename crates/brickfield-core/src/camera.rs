@@ -170,7 +170,9 @@ fn check_projection(projection: Projection) -> Result<(), CameraError> {
         Projection::Perspective { fov_y } if !(fov_y > 0.0 && fov_y < std::f64::consts::PI) => {
             Err(CameraError::FieldOfView { degrees: fov_y.to_degrees() })
         }
-        Projection::Orthographic { height } if !(height.is_finite() && height > 0.0) => Err(CameraError::Height { height }),
+        Projection::Orthographic { height } if !(height.is_finite() && height > 0.0) => {
+            Err(CameraError::Height { height })
+        }
         _ => Ok(()),
     }
 }
@@ -189,7 +191,8 @@ mod tests {
 
     #[test]
     fn orthographic_rays_are_parallel_and_a_pixel_apart() {
-        let camera = Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Z, Projection::Orthographic { height: 8.0 }).unwrap();
+        let camera =
+            Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Z, Projection::Orthographic { height: 8.0 }).unwrap();
         let rays = camera.pixel_rays(UVec2::new(8, 4));
         assert_eq!(rays.pixel_ray(3, 1).direction, DVec3::X);
         assert_eq!((rays.pixel_ray(4, 1).origin - rays.pixel_ray(3, 1).origin).length(), 2.0);

@@ -29,7 +29,9 @@ pub enum GridError {
     Spacing { axis: char, value: f64 },
     #[error("origin {origin} is not finite")]
     Origin { origin: DVec3 },
-    #[error("direction matrix {direction} has determinant {determinant:e}; its columns must be finite and independent (|determinant| of the unit columns above 1e-6)")]
+    #[error(
+        "direction matrix {direction} has determinant {determinant:e}; its columns must be finite and independent (|determinant| of the unit columns above 1e-6)"
+    )]
     Direction { direction: DMat3, determinant: f64 },
 }
 
@@ -42,7 +44,12 @@ impl Grid {
     ///
     /// # Errors
     /// A zero dimension, more voxels than `usize`, a spacing that is not finite and positive, a singular direction.
-    pub fn from_first_sample(dims: UVec3, spacing: DVec3, first_sample: DVec3, direction: DMat3) -> Result<Grid, GridError> {
+    pub fn from_first_sample(
+        dims: UVec3,
+        spacing: DVec3,
+        first_sample: DVec3,
+        direction: DMat3,
+    ) -> Result<Grid, GridError> {
         check_dims(dims)?;
         for (axis, value) in AXES.into_iter().zip(spacing.to_array()) {
             if !(value.is_finite() && value > 0.0) {
@@ -137,7 +144,13 @@ mod tests {
     #[test]
     fn first_sample_lies_at_voxel_centre() {
         let direction = DMat3::from_cols(DVec3::Y, DVec3::X, -DVec3::Z);
-        let grid = Grid::from_first_sample(UVec3::new(4, 5, 6), DVec3::new(1.0, 2.0, 3.0), DVec3::new(7.0, 8.0, 9.0), direction).unwrap();
+        let grid = Grid::from_first_sample(
+            UVec3::new(4, 5, 6),
+            DVec3::new(1.0, 2.0, 3.0),
+            DVec3::new(7.0, 8.0, 9.0),
+            direction,
+        )
+        .unwrap();
         let at = |x, y, z| grid.world(IndexPos(DVec3::new(x, y, z))).0;
         assert_eq!(at(0.5, 0.5, 0.5), DVec3::new(7.0, 8.0, 9.0));
         assert_eq!(at(1.5, 0.5, 0.5), DVec3::new(7.0, 9.0, 9.0));
@@ -148,7 +161,9 @@ mod tests {
     #[test]
     fn bad_grids_are_named() {
         let grid = |dims: [u32; 3], spacing: [f64; 3], direction| {
-            Grid::from_first_sample(UVec3::from(dims), DVec3::from(spacing), DVec3::ZERO, direction).unwrap_err().to_string()
+            Grid::from_first_sample(UVec3::from(dims), DVec3::from(spacing), DVec3::ZERO, direction)
+                .unwrap_err()
+                .to_string()
         };
         assert!(grid([4, 0, 4], [1.0; 3], DMat3::IDENTITY).contains("dimension y is 0"));
         assert!(grid([u32::MAX; 3], [1.0; 3], DMat3::IDENTITY).contains("more voxels"));

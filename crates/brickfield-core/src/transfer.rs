@@ -133,7 +133,13 @@ impl Knot {
 }
 
 fn check_knot(knot: usize, k: &Knot) -> Result<(), TransferError> {
-    let numbers = [("value", k.value), ("extinction", k.extinction), ("red", k.color[0]), ("green", k.color[1]), ("blue", k.color[2])];
+    let numbers = [
+        ("value", k.value),
+        ("extinction", k.extinction),
+        ("red", k.color[0]),
+        ("green", k.color[1]),
+        ("blue", k.color[2]),
+    ];
     if let Some((what, value)) = numbers.into_iter().find(|(_, v)| !v.is_finite()) {
         return Err(TransferError::NotFinite { knot, what, value });
     }
@@ -179,7 +185,8 @@ mod tests {
 
     #[test]
     fn linear_between_constant_outside_and_right_continuous_at_a_jump() {
-        let tf = TransferFunction::new(vec![knot(0.0, 0.0), knot(10.0, 1.0), knot(10.0, 3.0), knot(20.0, 3.0)]).unwrap();
+        let tf =
+            TransferFunction::new(vec![knot(0.0, 0.0), knot(10.0, 1.0), knot(10.0, 3.0), knot(20.0, 3.0)]).unwrap();
         let at = |v| tf.at(v).extinction;
         assert_eq!([at(-5.0), at(0.0), at(5.0), at(10.0), at(15.0), at(99.0)], [0.0, 0.0, 0.5, 3.0, 3.0, 3.0]);
         assert!(at(9.999_999) < 1.0);

@@ -149,6 +149,9 @@ mod tests {
     #[test]
     fn voxels_must_fill_the_grid() {
         let grid = Grid::axis_aligned(UVec3::new(2, 2, 2), DVec3::ONE).unwrap();
-        assert_eq!(Volume::new(grid, vec![0u8; 7]).unwrap_err().to_string(), "7 voxels do not fill a grid of 2 x 2 x 2");
+        assert_eq!(
+            Volume::new(grid, vec![0u8; 7]).unwrap_err().to_string(),
+            "7 voxels do not fill a grid of 2 x 2 x 2"
+        );
     }
 }
