@@ -1,1 +1,16 @@
 #![doc = include_str!("../README.md")]
+
+mod bins;
+mod build;
+mod downsample;
+mod fill;
+mod memory;
+mod sample;
+mod tree;
+
+pub use bins::{Bins, Histogram, N_BINS};
+pub use build::{BuildError, BuildOptions, Progress, build_tree, build_tree_observed};
+pub use downsample::Downsampling;
+pub use memory::{LevelMemory, TreeMemory, tree_memory};
+pub use sample::BrickSamples;
+pub use tree::{BrickSummary, BrickTree};

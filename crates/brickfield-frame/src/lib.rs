@@ -1,1 +1,17 @@
 #![doc = include_str!("../README.md")]
+
+mod backend;
+mod brick_set;
+mod feature;
+mod index;
+mod plan;
+mod rays;
+mod uniform;
+
+pub use backend::{Backend, Capabilities, Description, Frame, RenderError, ShaderFunction, Timing};
+pub use brick_set::{AtlasShape, BrickSet, BrickSetError, Decode, SampleFormat};
+pub use feature::{Feature, FeatureSet};
+pub use index::{IndexEntry, IndexGrid};
+pub use plan::{FramePlan, Mode, Sampling, SamplingError};
+pub use rays::{PlanRay, RayFrame};
+pub use uniform::{FrameUniforms, KnotUniform};

@@ -1,0 +1,65 @@
+//! One brick: its samples copied from a level, their range, and the histogram of the voxels it owns.
+
+use brickfield_core::glam::UVec3;
+use brickfield_core::{BrickId, BrickLayout, ValueRange};
+
+use crate::bins::{BinTable, Histogram, Tally};
+use crate::downsample::Dense;
+use crate::sample::Sample;
+
+/// Copies the brick's samples; those beyond the level's border replicate the border sample.
+pub(crate) fn copy_brick<T: Sample>(source: Dense<'_, T>, layout: &BrickLayout, id: BrickId, out: &mut [T]) {
+    let n = layout.side().n_samples() as usize;
+    let [x, y, z] = first_sample(layout, id).to_array().map(|i| i as usize);
+    let n_inside = n.min(source.dims.x as usize - x);
+    for (j, row) in out.chunks_exact_mut(n).enumerate() {
+        let from = source.row(y + j % n, z + j / n);
+        let (inside, beyond) = row.split_at_mut(n_inside);
+        inside.copy_from_slice(&from[x..x + n_inside]);
+        beyond.fill(from[from.len() - 1]);
+    }
+}
+
+/// Least and greatest of all samples of a brick.
+pub(crate) fn range_of<T: Sample>(samples: &[T]) -> ValueRange {
+    const LANES: usize = 16;
+    let (mut min, mut max) = ([samples[0]; LANES], [samples[0]; LANES]);
+    for group in samples.as_chunks::<LANES>().0 {
+        for lane in 0..LANES {
+            let v = group[lane];
+            min[lane] = if v < min[lane] { v } else { min[lane] };
+            max[lane] = if v > max[lane] { v } else { max[lane] };
+        }
+    }
+    let fold = |lanes: [T; LANES], pick: fn(f64, f64) -> f64| lanes.map(T::to_f64).into_iter().reduce(pick);
+    ValueRange { min: fold(min, f64::min).unwrap_or(0.0), max: fold(max, f64::max).unwrap_or(0.0) }
+}
+
+/// The histogram of the voxels that a level-0 brick owns: not its upper faces, except at the volume's border.
+pub(crate) fn owned_histogram<T: Sample>(
+    samples: &[T],
+    layout: &BrickLayout,
+    id: BrickId,
+    table: &BinTable,
+) -> Histogram {
+    let n = layout.side().n_samples() as usize;
+    let [nx, ny, nz] = n_owned(layout, id).to_array().map(|i| i as usize);
+    let mut tally = Tally::default();
+    for slice in samples.chunks_exact(n * n).take(nz) {
+        for row in slice.chunks_exact(n).take(ny) {
+            tally.count(&row[..nx], table);
+        }
+    }
+    tally.histogram()
+}
+
+/// The brick's first sample, counted in samples of its level.
+fn first_sample(layout: &BrickLayout, id: BrickId) -> UVec3 {
+    id.coords * layout.side().n_cells()
+}
+
+fn n_owned(layout: &BrickLayout, id: BrickId) -> UVec3 {
+    let rest = layout.dims() - first_sample(layout, id);
+    let is_last = (id.coords + 1).cmpeq(layout.n_bricks(id.level));
+    UVec3::select(is_last, rest, UVec3::splat(layout.side().n_cells()))
+}

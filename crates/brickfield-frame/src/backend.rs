@@ -1,0 +1,145 @@
+//! The one trait that crosses crates: a backend replays plans.
+
+use brickfield_core::Image;
+use brickfield_core::glam::UVec2;
+
+use crate::FramePlan;
+
+/// Replays frame plans; decides nothing.
+pub trait Backend {
+    /// What this backend is, and what it can do.
+    fn describe(&self) -> &Description;
+
+    /// Renders a frame. What the plan shares with the last one (bricks, shader variant) stays on the device.
+    ///
+    /// # Errors
+    /// What the device could not do: how much was asked, and the limit.
+    fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError>;
+
+    /// Evaluates one function of the renderer on a list of inputs, in the context of a plan.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    fn evaluate(
+        &mut self,
+        plan: &FramePlan,
+        function: ShaderFunction,
+        inputs: &[[f32; 4]],
+    ) -> Result<Vec<[f32; 4]>, RenderError>;
+}
+
+/// What a backend is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Description {
+    /// `cpu`, `wgpu` or `ash`.
+    pub backend: &'static str,
+    /// The adapter's name, as its driver states it.
+    pub adapter: String,
+    /// The driver's name and version.
+    pub driver: String,
+    /// What it can do.
+    pub capabilities: Capabilities,
+}
+
+/// What a backend can do; a plan is prepared for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Capabilities {
+    /// Most texels along a side of a 3-D texture.
+    pub max_texture_3d: u32,
+    /// Most pixels along a side of a picture.
+    pub max_image: u32,
+    /// Most bytes in a buffer that a shader reads.
+    pub max_buffer_bytes: u64,
+    /// Bits of a filter weight (`subTexelPrecisionBits`); 23 where f32 arithmetic filters.
+    pub sub_texel_bits: u32,
+}
+
+/// A rendered frame.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Linear, premultiplied RGBA.
+    pub image: Image<f32>,
+    /// How long it took.
+    pub timing: Timing,
+}
+
+/// How long a frame took, in milliseconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Timing {
+    /// Bringing bricks, index and transfer function to the device, and building the shader variant, if new.
+    pub upload_ms: f64,
+    /// Rendering as the device's timestamps say; `None` where it has none.
+    pub device_ms: Option<f64>,
+    /// Rendering as the caller waits for it, without upload and read-back.
+    pub wall_ms: f64,
+    /// Bringing the picture back.
+    pub read_back_ms: f64,
+}
+
+/// A function of the renderer that can be held against its equation alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ShaderFunction {
+    /// x: optical depth. Returns x: opacity.
+    Alpha,
+    /// x: opacity. Returns x: optical depth (`brickfield_optics::depth`).
+    Depth,
+    /// x: data value. Returns linear RGB and extinction.
+    Classify,
+    /// x, y: data values at the rule's nodes, z: length in world units. Returns emission and depth.
+    Segment,
+    /// x, y, z: sample position. Returns x: data value, y: 1 if the position's brick is resident, else 0.
+    Sample,
+    /// x, y: pixel. Returns the anchor relative to the frame's centre, and its parameter.
+    RayAnchor,
+    /// x, y: pixel. Returns the direction in voxels per world unit, w: 0.
+    RayDirection,
+}
+
+impl ShaderFunction {
+    /// All functions.
+    pub const ALL: [ShaderFunction; 7] = [
+        ShaderFunction::Alpha,
+        ShaderFunction::Depth,
+        ShaderFunction::Classify,
+        ShaderFunction::Segment,
+        ShaderFunction::Sample,
+        ShaderFunction::RayAnchor,
+        ShaderFunction::RayDirection,
+    ];
+
+    /// The function's name in shaders and reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            ShaderFunction::Alpha => "alpha",
+            ShaderFunction::Depth => "depth",
+            ShaderFunction::Classify => "classify",
+            ShaderFunction::Segment => "segment",
+            ShaderFunction::Sample => "sample",
+            ShaderFunction::RayAnchor => "ray_anchor",
+            ShaderFunction::RayDirection => "ray_direction",
+        }
+    }
+}
+
+/// Why a frame could not be rendered.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum RenderError {
+    #[error("a picture of {} x {} pixels is beyond the device's limit of {limit} a side", size.x, size.y)]
+    ImageTooLarge { size: UVec2, limit: u32 },
+    #[error("{n_bricks} bricks of {side}^3 samples do not fit a 3-D texture of at most {limit} texels a side")]
+    AtlasTooLarge { n_bricks: u32, side: u32, limit: u32 },
+    #[error("{what} of {n_bytes} bytes is beyond the device's limit of {limit} bytes")]
+    BufferTooLarge { what: &'static str, n_bytes: u64, limit: u64 },
+    #[error("out of device memory: {what} needs {n_bytes} bytes{}", available.map(|a| format!(", the device's heap holds {a}")).unwrap_or_default())]
+    OutOfMemory { what: &'static str, n_bytes: u64, available: Option<u64> },
+    #[error("the device was lost while {doing}")]
+    DeviceLost { doing: &'static str },
+    #[error("this device cannot {what}")]
+    Unsupported { what: &'static str },
+    #[error("{call} failed: {code}")]
+    Driver { call: &'static str, code: String },
+    #[error("shader variant: {message}")]
+    Shader { message: String },
+}

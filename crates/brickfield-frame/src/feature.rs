@@ -1,0 +1,78 @@
+//! What a scene needs of a renderer, as a set.
+
+/// One thing that a scene may need; what is not in the set is left out of the shader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Feature {
+    /// The filter of the texture unit instead of eight loads (fast mode).
+    HardwareFilter,
+    /// Rays end when hardly anything shines through any more (fast mode).
+    EarlyTermination,
+    /// Some bricks of the index are not resident: rays jump over them.
+    SkipTransparent,
+    /// The cut has bricks of several levels.
+    MultiLevel,
+    /// The transfer function has several knots, and needs a lookup.
+    TransferLookup,
+}
+
+impl Feature {
+    /// All features.
+    pub const ALL: [Feature; 5] = [
+        Feature::HardwareFilter,
+        Feature::EarlyTermination,
+        Feature::SkipTransparent,
+        Feature::MultiLevel,
+        Feature::TransferLookup,
+    ];
+
+    /// The feature's name in shader conditions (`@if(name)`) and reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Feature::HardwareFilter => "hardware_filter",
+            Feature::EarlyTermination => "early_termination",
+            Feature::SkipTransparent => "skip_transparent",
+            Feature::MultiLevel => "multi_level",
+            Feature::TransferLookup => "transfer_lookup",
+        }
+    }
+}
+
+/// A set of [`Feature`]s.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct FeatureSet(u32);
+
+impl FeatureSet {
+    /// Every feature: the general shader.
+    pub fn all() -> FeatureSet {
+        Feature::ALL.into_iter().collect()
+    }
+
+    /// Whether the set holds `feature`.
+    pub const fn contains(self, feature: Feature) -> bool {
+        self.0 >> feature as u32 & 1 == 1
+    }
+
+    /// The set with `feature`.
+    #[must_use]
+    pub const fn with(self, feature: Feature) -> FeatureSet {
+        FeatureSet(self.0 | 1 << feature as u32)
+    }
+
+    /// The set without `feature`.
+    #[must_use]
+    pub const fn without(self, feature: Feature) -> FeatureSet {
+        FeatureSet(self.0 & !(1 << feature as u32))
+    }
+
+    /// The features in the set.
+    pub fn iter(self) -> impl Iterator<Item = Feature> {
+        Feature::ALL.into_iter().filter(move |f| self.contains(*f))
+    }
+}
+
+impl FromIterator<Feature> for FeatureSet {
+    fn from_iter<I: IntoIterator<Item = Feature>>(features: I) -> FeatureSet {
+        features.into_iter().fold(FeatureSet::default(), FeatureSet::with)
+    }
+}

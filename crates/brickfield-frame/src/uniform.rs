@@ -1,0 +1,117 @@
+//! The plan's numbers as shaders read them.
+//!
+//! The layouts are held against naga's member offsets by a test of `brickfield-shaders`.
+
+use brickfield_core::Knot;
+use brickfield_core::glam::{DVec3, UVec3};
+use bytemuck::{Pod, Zeroable};
+
+use crate::{AtlasShape, FramePlan};
+
+/// The frame's uniform block; every member is 16 bytes. Positions are in sample space relative to `RayFrame::center`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct FrameUniforms {
+    /// Anchor of the picture's centre; w: distance of that anchor past the start.
+    pub anchor: [f32; 4],
+    /// Change of the anchor a pixel to the right; w: side of a pixel in the plane at distance 1 (0: parallel rays).
+    pub anchor_right: [f32; 4],
+    /// Change of the anchor a pixel down; w: distance from the eye to the plane of the anchors.
+    pub anchor_down: [f32; 4],
+    /// Direction of the picture's centre, voxels per world unit; w: least parameter (0 or minus the start).
+    pub direction: [f32; 4],
+    /// Change of the direction a pixel to the right; w: step in world units.
+    pub direction_right: [f32; 4],
+    /// Change of the direction a pixel down; w: transmittance floor.
+    pub direction_down: [f32; 4],
+    /// Lower corner of the domain; w: scale from a texture read to a data value relative to the first knot.
+    pub domain_min: [f32; 4],
+    /// Upper corner of the domain; w: offset of the same.
+    pub domain_max: [f32; 4],
+    /// Lower corner of what is visible; w: cells along a brick's side.
+    pub visible_min: [f32; 4],
+    /// Upper corner of what is visible; w: reserved.
+    pub visible_max: [f32; 4],
+    /// Subtracted from positions to reach sample space's origin (minus the centre); w: reserved.
+    pub origin: [f32; 4],
+    /// The last sample, relative to the centre; w: reserved.
+    pub last_sample: [f32; 4],
+    /// Cells of the index grid; w: number of knots.
+    pub index_dims: [u32; 4],
+    /// Bricks of the atlas along x, y, z; w: samples along a brick's side.
+    pub atlas_bricks: [u32; 4],
+    /// Width and height of the picture; z, w: reserved.
+    pub size: [u32; 4],
+}
+
+/// A transfer function's knot.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct KnotUniform {
+    /// Straight linear RGB; w: extinction per world unit.
+    pub optics: [f32; 4],
+    /// x: data value relative to the first knot; y: reciprocal of the distance to the next knot (0 at the last and before a
+    /// jump's second knot); z, w: reserved.
+    pub value: [f32; 4],
+}
+
+impl FrameUniforms {
+    /// The uniform block of a plan whose bricks lie in an atlas of `atlas`.
+    pub fn of(plan: &FramePlan, atlas: AtlasShape) -> FrameUniforms {
+        let rays = &plan.rays;
+        let n_cells = f64::from(plan.bricks.side().n_cells());
+        let decode = plan.bricks.decode();
+        let value_origin = value_origin(plan);
+        let relative = |p: DVec3| p - rays.center;
+        FrameUniforms {
+            anchor: float4(rays.anchor[0], rays.anchor_past_start),
+            anchor_right: float4(rays.anchor[1], rays.pixel),
+            anchor_down: float4(rays.anchor[2], rays.anchor_depth),
+            direction: float4(rays.direction[0], 0.0 - rays.start),
+            direction_right: float4(rays.direction[1], plan.sampling.step_world()),
+            direction_down: float4(rays.direction[2], plan.sampling.transmittance_floor()),
+            domain_min: float4(relative(plan.domain.min), decode.scale),
+            domain_max: float4(relative(plan.domain.max), decode.offset - value_origin),
+            visible_min: float4(relative(plan.visible.min), n_cells),
+            visible_max: float4(relative(plan.visible.max), 0.0),
+            origin: float4(-rays.center, 0.0),
+            last_sample: float4(relative(plan.last_sample()), 0.0),
+            index_dims: uint4(plan.index.dims(), plan.transfer.knots().len() as u32),
+            atlas_bricks: uint4(atlas.bricks, plan.bricks.side().n_samples()),
+            size: [rays.size.x, rays.size.y, 0, 0],
+        }
+    }
+}
+
+impl KnotUniform {
+    /// The knots of a plan's transfer function.
+    pub fn of(plan: &FramePlan) -> Vec<KnotUniform> {
+        let knots = plan.transfer.knots();
+        let reciprocal = |i: usize| match knots.get(i + 1) {
+            Some(next) if next.value > knots[i].value => 1.0 / (next.value - knots[i].value),
+            _ => 0.0,
+        };
+        knots.iter().enumerate().map(|(i, k)| knot(k, value_origin(plan), reciprocal(i))).collect()
+    }
+}
+
+/// Values in shaders are relative to this one, so that f32 spends its digits on the transfer function's range.
+fn value_origin(plan: &FramePlan) -> f64 {
+    plan.transfer.knots()[0].value
+}
+
+fn knot(k: &Knot, value_origin: f64, reciprocal: f64) -> KnotUniform {
+    let [r, g, b] = k.color.map(|c| c as f32);
+    KnotUniform {
+        optics: [r, g, b, k.extinction as f32],
+        value: [(k.value - value_origin) as f32, reciprocal as f32, 0.0, 0.0],
+    }
+}
+
+fn float4(v: DVec3, w: f64) -> [f32; 4] {
+    [v.x as f32, v.y as f32, v.z as f32, w as f32]
+}
+
+fn uint4(v: UVec3, w: u32) -> [u32; 4] {
+    [v.x, v.y, v.z, w]
+}

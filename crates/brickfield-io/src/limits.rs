@@ -1,0 +1,66 @@
+//! How much a file may claim before anything is allocated for it.
+
+use brickfield_core::ScalarType;
+use brickfield_core::glam::UVec3;
+
+use crate::ReadError;
+
+/// What a reader may allocate.
+///
+/// A header is held against the limit before any voxel is allocated, and no decoder expands more than the header
+/// claims. Peak memory is the volume, one more copy while values are rescaled or bytes unpacked, and a few MiB.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Most bytes that the voxels of one volume may take, in the file's type and in the type they are read into.
+    pub max_bytes: u64,
+}
+
+impl Default for Limits {
+    /// 16 GiB: 2048 x 2048 x 2048 voxels of 16 bits.
+    fn default() -> Limits {
+        Limits { max_bytes: 16 << 30 }
+    }
+}
+
+/// A shape that has been held against the limits: the only way to an allocation.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shape {
+    pub(crate) dims: UVec3,
+    pub(crate) scalar: ScalarType,
+}
+
+impl Shape {
+    /// # Errors
+    /// A dimension outside 1..=u32::MAX, or more bytes than the limit.
+    pub(crate) fn claim(dims: [u64; 3], scalar: ScalarType, limits: &Limits) -> Result<Shape, ReadError> {
+        let mut checked = [0u32; 3];
+        for ((out, value), axis) in checked.iter_mut().zip(dims).zip(['x', 'y', 'z']) {
+            let in_range = u32::try_from(value).ok().filter(|v| *v >= 1);
+            *out = in_range.ok_or_else(|| ReadError::field(format!("dimension {axis}"), value, "1 to 4294967295"))?;
+        }
+        let shape = Shape { dims: UVec3::from(checked), scalar };
+        let what = || format!("a volume of {} x {} x {} voxels of {scalar}", dims[0], dims[1], dims[2]);
+        check_bytes(shape.n_voxels_claimed() * scalar.n_bytes() as u128, limits, what)?;
+        Ok(shape)
+    }
+
+    fn n_voxels_claimed(&self) -> u128 {
+        self.dims.to_array().into_iter().map(u128::from).product()
+    }
+
+    pub(crate) fn n_voxels(&self) -> usize {
+        self.n_voxels_claimed() as usize
+    }
+
+    pub(crate) fn n_bytes(&self) -> u64 {
+        self.n_voxels_claimed() as u64 * self.scalar.n_bytes() as u64
+    }
+}
+
+pub(crate) fn check_bytes(n_bytes: u128, limits: &Limits, what: impl Fn() -> String) -> Result<(), ReadError> {
+    let addressable = n_bytes <= isize::MAX as u128;
+    if n_bytes > u128::from(limits.max_bytes) || !addressable {
+        return Err(ReadError::TooLarge { what: what(), n_bytes, max_bytes: limits.max_bytes });
+    }
+    Ok(())
+}

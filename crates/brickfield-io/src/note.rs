@@ -1,0 +1,80 @@
+//! What a reader noticed and the user ought to know, though the volume could be read.
+
+use std::fmt;
+
+use brickfield_core::NonFinite;
+
+/// Something about a file that the volume alone does not show.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum Note {
+    /// Voxels that were not finite and have been replaced.
+    NonFinite(NonFinite),
+    /// Slices that are not evenly spaced. `positions` are the distances from the first slice along the stack, in
+    /// world units; the grid has the median step, and voxels are as in the file.
+    UnevenSpacing { positions: Vec<f64>, min_step: f64, median_step: f64, max_step: f64 },
+    /// The slices are sheared against their normal. The grid honours it: its third direction is not the normal.
+    GantryTilt { degrees: f64 },
+    /// The file has several arrays (channels, data sets); one was read.
+    SeveralArrays { kept: String, n_arrays: usize },
+    /// An axis beyond the three of space; its first entry was read.
+    FirstOfAxis { axis: String, n_entries: u64 },
+    /// The file states no usable spacing; 1 was taken.
+    SpacingAssumed { axis: char, reason: &'static str },
+    /// The file states an orientation that cannot be used; the next best statement was taken.
+    OrientationIgnored { what: &'static str },
+    /// The file states a rescale that cannot be used; the stored values were kept.
+    RescaleIgnored { slope: f64, intercept: f64 },
+    /// A folder holds several series; the one with most slices was read.
+    SeveralSeries { kept: String, n_series: usize, n_slices_left_out: usize },
+    /// Slices at a position that an earlier slice has; they were left out.
+    DuplicateSlices { n_slices: usize },
+    /// Files of a folder that are not slices.
+    FilesSkipped { n_files: usize, first: String, reason: String },
+    /// The data go on after the last voxel that the header promises.
+    SurplusData,
+    /// MONOCHROME1: the file wants low values shown bright. Values are as in the file.
+    LowIsBright,
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Note::NonFinite(n) => write!(
+                f,
+                "{} voxels are not finite ({} NaN, {} +infinity, {} -infinity) and were replaced",
+                n.total(),
+                n.n_nan,
+                n.n_positive_infinity,
+                n.n_negative_infinity
+            ),
+            Note::UnevenSpacing { positions, min_step, median_step, max_step } => write!(
+                f,
+                "{} slices are unevenly spaced, by {min_step:.4} to {max_step:.4}; the median {median_step:.4} is used",
+                positions.len()
+            ),
+            Note::GantryTilt { degrees } => write!(f, "gantry tilt of {degrees:.2} degrees; the grid is sheared by it"),
+            Note::SeveralArrays { kept, n_arrays } => write!(f, "one of {n_arrays} arrays was read: {kept:?}"),
+            Note::FirstOfAxis { axis, n_entries } => {
+                write!(f, "axis {axis:?} has {n_entries} entries; the first was read")
+            }
+            Note::SpacingAssumed { axis, reason } => write!(f, "spacing {axis} {reason}; 1 is used"),
+            Note::OrientationIgnored { what } => write!(f, "{what} and was ignored"),
+            Note::RescaleIgnored { slope, intercept } => {
+                write!(f, "rescale by slope {slope} and intercept {intercept} was ignored")
+            }
+            Note::SeveralSeries { kept, n_series, n_slices_left_out } => {
+                write!(f, "one of {n_series} series was read: {kept}; {n_slices_left_out} slices were left out")
+            }
+            Note::DuplicateSlices { n_slices } => {
+                write!(f, "{n_slices} slices lie where another does and were left out")
+            }
+            Note::FilesSkipped { n_files, first, reason } => {
+                write!(f, "{n_files} files are no slices and were skipped, first {first:?}: {reason}")
+            }
+            Note::SurplusData => f.write_str("the data go on after the last voxel that the header promises"),
+            Note::LowIsBright => f.write_str("the file wants low values shown bright (MONOCHROME1); values are as stored"),
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! From what files state about space to a [`Grid`].
+
+use brickfield_core::Grid;
+use brickfield_core::glam::{DMat3, DVec3, UVec3};
+
+use crate::{Note, ReadError};
+
+/// The world position of the first sample, and one world step per index axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Placement {
+    pub(crate) first_sample: DVec3,
+    pub(crate) steps: DMat3,
+}
+
+impl Placement {
+    pub(crate) fn axis_aligned(spacing: DVec3, first_sample: DVec3) -> Placement {
+        Placement { first_sample, steps: DMat3::from_diagonal(spacing) }
+    }
+
+    /// Up to three axis steps; missing ones are made up, of length 1 and orthogonal to those given.
+    pub(crate) fn from_axes(axes: &[DVec3], first_sample: DVec3) -> Placement {
+        let steps = match *axes {
+            [] => DMat3::IDENTITY,
+            [x] => with_orthogonal(x),
+            [x, y] => DMat3::from_cols(x, y, x.cross(y).normalize_or(DVec3::Z)),
+            [x, y, z, ..] => DMat3::from_cols(x, y, z),
+        };
+        Placement { first_sample, steps }
+    }
+
+    /// The same place with +x and +y negated: right-anterior-superior to left-posterior-superior and back.
+    pub(crate) fn negated_xy(self) -> Placement {
+        self.scaled(DVec3::new(-1.0, -1.0, 1.0))
+    }
+
+    pub(crate) fn scaled(self, factors: DVec3) -> Placement {
+        Placement {
+            first_sample: self.first_sample * factors,
+            steps: DMat3::from_diagonal(factors) * self.steps,
+        }
+    }
+
+    /// # Errors
+    /// As [`Grid::from_first_sample`].
+    pub(crate) fn grid(self, dims: UVec3) -> Result<Grid, ReadError> {
+        let lengths = self.steps.to_cols_array_2d().map(|c| DVec3::from(c).length());
+        Ok(Grid::from_first_sample(dims, DVec3::from(lengths), self.first_sample, self.steps)?)
+    }
+}
+
+fn with_orthogonal(x: DVec3) -> DMat3 {
+    match x.try_normalize() {
+        Some(unit) => {
+            let (y, z) = unit.any_orthonormal_pair();
+            DMat3::from_cols(x, y, z)
+        }
+        None => DMat3::from_cols(x, DVec3::Y, DVec3::Z),
+    }
+}
+
+/// A stated spacing, or 1 with a note where it is 0 or not finite. The sign is kept.
+pub(crate) fn usable_spacing(stated: f64, axis: char, notes: &mut Vec<Note>) -> f64 {
+    let reason = match stated {
+        v if v.is_nan() => "is not a number",
+        v if v.is_infinite() => "is infinite",
+        0.0 => "is 0",
+        v => return v,
+    };
+    notes.push(Note::SpacingAssumed { axis, reason });
+    1.0
+}
+
+pub(crate) const AXES: [char; 3] = ['x', 'y', 'z'];

@@ -1,0 +1,176 @@
+//! From bytes and text to voxels: checked before it is allocated, read in pieces, never more than claimed.
+
+use std::io::{BufRead, Read};
+use std::str::FromStr;
+
+use brickfield_core::{Scalar, ScalarType, Voxels, with_voxels};
+
+use crate::ReadError;
+use crate::limits::Shape;
+
+/// Which end of a number comes first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum ByteOrder {
+    Little,
+    Big,
+}
+
+/// A scalar that can be read from bytes and from text.
+pub(crate) trait Sample: Scalar + FromStr {
+    fn append(bytes: &[u8], order: ByteOrder, out: &mut Vec<Self>);
+}
+
+macro_rules! sample {
+    ($($t:ty)*) => { $(
+        impl Sample for $t {
+            fn append(bytes: &[u8], order: ByteOrder, out: &mut Vec<$t>) {
+                let (numbers, _) = bytes.as_chunks::<{ size_of::<$t>() }>();
+                match order {
+                    ByteOrder::Little => out.extend(numbers.iter().map(|b| <$t>::from_le_bytes(*b))),
+                    ByteOrder::Big => out.extend(numbers.iter().map(|b| <$t>::from_be_bytes(*b))),
+                }
+            }
+        }
+    )* };
+}
+sample! { u8 i8 u16 i16 u32 i32 f32 f64 }
+
+/// Empty voxels with room for the whole shape.
+///
+/// # Errors
+/// If there is no memory for them.
+pub(crate) fn allocate(shape: &Shape) -> Result<Voxels, ReadError> {
+    fn reserve<T: Scalar>(n: usize) -> Result<Voxels, ReadError> {
+        let mut values = Vec::<T>::new();
+        let n_bytes = n as u128 * size_of::<T>() as u128;
+        values.try_reserve_exact(n).map_err(|_| ReadError::OutOfMemory { n_bytes })?;
+        Ok(T::wrap(values))
+    }
+    let n = shape.n_voxels();
+    match shape.scalar {
+        ScalarType::U8 => reserve::<u8>(n),
+        ScalarType::I8 => reserve::<i8>(n),
+        ScalarType::U16 => reserve::<u16>(n),
+        ScalarType::I16 => reserve::<i16>(n),
+        ScalarType::U32 => reserve::<u32>(n),
+        ScalarType::I32 => reserve::<i32>(n),
+        ScalarType::F32 => reserve::<f32>(n),
+        ScalarType::F64 => reserve::<f64>(n),
+    }
+}
+
+/// Appends `n` binary samples; `what` names the source in errors.
+pub(crate) fn append_binary(
+    voxels: &mut Voxels,
+    reader: &mut dyn Read,
+    n: usize,
+    order: ByteOrder,
+    what: &str,
+) -> Result<(), ReadError> {
+    with_voxels!(voxels, v => append_binary_as(v, reader, n, order, what))
+}
+
+const CHUNK_BYTES: usize = 1 << 18;
+
+fn append_binary_as<T: Sample>(
+    out: &mut Vec<T>,
+    reader: &mut dyn Read,
+    n: usize,
+    order: ByteOrder,
+    what: &str,
+) -> Result<(), ReadError> {
+    let expected_bytes = n * size_of::<T>();
+    let mut chunk = vec![0; CHUNK_BYTES.min(expected_bytes)];
+    let mut n_bytes = 0;
+    while n_bytes < expected_bytes {
+        let piece = &mut chunk[..CHUNK_BYTES.min(expected_bytes - n_bytes)];
+        let n_read = fill(reader, piece).map_err(|e| ReadError::io(what, e))?;
+        T::append(&piece[..n_read], order, out);
+        n_bytes += n_read;
+        if n_read < piece.len() {
+            let (n_bytes, expected_bytes) = (n_bytes as u64, expected_bytes as u128);
+            return Err(ReadError::Truncated { what: what.to_owned(), n_bytes, expected_bytes });
+        }
+    }
+    Ok(())
+}
+
+/// Reads until the buffer is full or the source ends; bytes read.
+pub(crate) fn fill(reader: &mut dyn Read, buffer: &mut [u8]) -> std::io::Result<usize> {
+    let mut n = 0;
+    while n < buffer.len() {
+        match reader.read(&mut buffer[n..]) {
+            Ok(0) => break,
+            Ok(m) => n += m,
+            Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
+    }
+    Ok(n)
+}
+
+/// Appends `n` samples written as text between white space or commas; `what` names the source in errors.
+pub(crate) fn append_text(
+    voxels: &mut Voxels,
+    reader: &mut dyn BufRead,
+    n: usize,
+    what: &str,
+) -> Result<(), ReadError> {
+    with_voxels!(voxels, v => append_text_as(v, reader, n, what))
+}
+
+fn append_text_as<T: Sample>(
+    out: &mut Vec<T>,
+    reader: &mut dyn BufRead,
+    n: usize,
+    what: &str,
+) -> Result<(), ReadError> {
+    let mut token = Vec::new();
+    for i in 0..n {
+        next_token(reader, &mut token).map_err(|e| ReadError::io(what, e))?;
+        if token.is_empty() {
+            return Err(ReadError::TooFewSamples { what: what.to_owned(), found: i, expected: n });
+        }
+        let text = String::from_utf8_lossy(&token);
+        let expected = || format!("a number that fits {}", T::TYPE);
+        let value = parse::<T>(&text).ok_or_else(|| ReadError::field(format!("sample {i}"), &text, expected()))?;
+        out.push(value);
+    }
+    Ok(())
+}
+
+/// The number, also where an integer is written as a float ("3.0").
+fn parse<T: Sample>(text: &str) -> Option<T> {
+    text.parse().ok().or_else(|| {
+        let wide: f64 = text.parse().ok()?;
+        let value = T::from_f64(wide);
+        (value.to_f64() == wide).then_some(value)
+    })
+}
+
+const MAX_TOKEN_BYTES: usize = 400;
+
+fn next_token(reader: &mut dyn BufRead, token: &mut Vec<u8>) -> std::io::Result<()> {
+    let separates = |b: &u8| b.is_ascii_whitespace() || *b == b',';
+    token.clear();
+    loop {
+        let bytes = reader.fill_buf()?;
+        if bytes.is_empty() {
+            return Ok(());
+        }
+        let start = if token.is_empty() { bytes.iter().take_while(|b| separates(b)).count() } else { 0 };
+        let length = bytes[start..].iter().take_while(|b| !separates(b)).count();
+        token.extend_from_slice(&bytes[start..start + length]);
+        let ended = start + length < bytes.len();
+        reader.consume(start + length);
+        if (ended && !token.is_empty()) || token.len() > MAX_TOKEN_BYTES {
+            return Ok(());
+        }
+    }
+}
+
+/// Least bytes in which `n` numbers can be written as text.
+pub(crate) fn least_text_bytes(n: usize) -> u128 {
+    (2 * n as u128).saturating_sub(1)
+}
