@@ -2,7 +2,7 @@
 
 use brickfield_bricks::{BrickTree, BuildOptions, Downsampling, build_tree};
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{BrickSide, Grid, Scalar, Volume, Voxels};
+use brickfield_core::{BrickSide, Grid, Scalar, Volume};
 use divan::Bencher;
 use divan::counter::BytesCount;
 
@@ -13,10 +13,7 @@ fn main() {
 }
 
 #[divan::bench(types = [u8, u16, f32], args = cases(), sample_count = 5, sample_size = 1)]
-fn build<T: Scalar>(bencher: Bencher<'_, '_>, (side, downsampling): &(BrickSide, Downsampling))
-where
-    Voxels: From<Vec<T>>,
-{
+fn build<T: Scalar>(bencher: Bencher<'_, '_>, (side, downsampling): &(BrickSide, Downsampling)) {
     let volume = noisy_ball::<T>();
     let n_bytes = volume.grid().n_voxels() * T::TYPE.n_bytes();
     let options = BuildOptions { side: *side, downsampling: *downsampling, max_bytes: None };
@@ -33,10 +30,7 @@ fn tree(volume: &Volume, options: &BuildOptions) -> BrickTree {
 }
 
 /// A ball in noise: neither constant, which flatters, nor pure noise, which no scanner makes.
-fn noisy_ball<T: Scalar>() -> Volume
-where
-    Voxels: From<Vec<T>>,
-{
+fn noisy_ball<T: Scalar>() -> Volume {
     let half = f64::from(N) / 2.0;
     let value = |i: u32| {
         let p = UVec3::new(i % N, i / N % N, i / (N * N)).as_dvec3() - half;
@@ -45,5 +39,5 @@ where
     };
     let voxels: Vec<T> = (0..N.pow(3)).map(value).collect();
     let grid = Grid::axis_aligned(UVec3::splat(N), DVec3::ONE).expect("a plain grid");
-    Volume::new(grid, voxels).expect("voxels fill the grid")
+    Volume::new(grid, T::wrap(voxels)).expect("voxels fill the grid")
 }
