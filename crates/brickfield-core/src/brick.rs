@@ -101,6 +101,23 @@ impl Cut {
         Cut { layout, bricks: layout.bricks(level).collect() }
     }
 
+    /// The cut that a depth-first descent from the root makes: a cut by construction, so nothing is left to check.
+    ///
+    /// `visit` sees a brick and what its parent handed down; it returns what to hand to the children, or `None` to
+    /// take the brick itself. A brick of level 0 is taken whatever `visit` returns. The cut holds the bricks in the
+    /// order in which they are taken.
+    pub fn descend<S: Copy>(layout: BrickLayout, state: S, mut visit: impl FnMut(BrickId, S) -> Option<S>) -> Cut {
+        let mut bricks = Vec::new();
+        let mut stack = vec![(layout.root(), state)];
+        while let Some((id, state)) = stack.pop() {
+            match visit(id, state) {
+                Some(state) if id.level.0 > 0 => stack.extend(layout.children(id).map(|child| (child, state))),
+                _ => bricks.push(id),
+            }
+        }
+        Cut { layout, bricks }
+    }
+
     /// The octree's geometry.
     pub fn layout(&self) -> &BrickLayout {
         &self.layout
@@ -141,6 +158,16 @@ mod tests {
             let cut = Cut::uniform(layout(), level);
             assert!(Cut::new(layout(), cut.bricks().to_vec()).is_ok());
         }
+    }
+
+    #[test]
+    fn a_descent_makes_a_cut_and_hands_state_down() {
+        let cut = Cut::descend(layout(), 0, |id, depth| {
+            assert_eq!(depth + id.level.0, layout().root().level.0);
+            (id.coords.x > 0 || id.level == layout().root().level).then_some(depth + 1)
+        });
+        assert!(Cut::new(layout(), cut.bricks().to_vec()).is_ok());
+        assert!(cut.n_bricks_per_level().iter().filter(|n| **n > 0).count() > 1);
     }
 
     #[test]
