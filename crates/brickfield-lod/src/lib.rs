@@ -1,1 +1,11 @@
 #![doc = include_str!("../README.md")]
+
+mod criterion;
+mod frustum;
+mod select;
+mod tile;
+
+pub use criterion::{Answer, Criterion};
+pub use frustum::{Frustum, Planes};
+pub use select::{Culling, Selection, View, select_by, select_cut};
+pub use tile::Tile;
