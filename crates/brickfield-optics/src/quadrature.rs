@@ -159,18 +159,25 @@ pub fn preintegrate(transfer: &TransferFunction, near: f64, far: f64, length_wor
     if near == far {
         return exponential(transfer.at(near), length_world);
     }
-    let (low, high) = (near.min(far), near.max(far));
     let knots = transfer.knots();
-    let cuts = knots.iter().map(|k| k.value).filter(|v| low < *v && *v < high);
-    let mut ends: Vec<f64> = std::iter::once(low).chain(cuts).chain(std::iter::once(high)).collect();
-    if far < near {
-        ends.reverse();
-    }
+    let above = knots.partition_point(|k| k.value <= near.min(far));
+    let below = knots.partition_point(|k| k.value < near.max(far));
     let mut ray = RayState::default();
-    for pair in ends.windows(2).filter(|p| p[0] != p[1]) {
-        let length = length_world * (pair[1] - pair[0]) / (far - near);
-        ray.push(linear_piece(one_sided(transfer, pair[0], pair[1]), one_sided(transfer, pair[1], pair[0]), length));
+    let mut from = near;
+    let mut advance = |to: f64| {
+        if to != from {
+            let length = length_world * (to - from) / (far - near);
+            ray.push(linear_piece(one_sided(transfer, from, to), one_sided(transfer, to, from), length));
+        }
+        from = to;
+    };
+    let inside = &knots[above.min(below)..below];
+    if near < far {
+        inside.iter().for_each(|k| advance(k.value));
+    } else {
+        inside.iter().rev().for_each(|k| advance(k.value));
     }
+    advance(far);
     Segment { depth: ray.depth, emission: ray.emission }
 }
 

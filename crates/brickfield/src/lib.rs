@@ -1,1 +1,26 @@
 #![doc = include_str!("../README.md")]
+
+mod backends;
+mod picture;
+mod prepare;
+mod residency;
+mod scene;
+mod viewpoint;
+mod visibility;
+
+#[cfg(feature = "cli")]
+pub mod options;
+
+pub use backends::{AdapterInfo, BackendError, BackendKind, BackendStatus, Validation, backends, open_backend};
+pub use brickfield_bricks as bricks;
+pub use brickfield_core as core;
+pub use brickfield_cpu as cpu;
+pub use brickfield_frame as frame;
+pub use brickfield_io as io;
+pub use brickfield_lod as lod;
+pub use brickfield_optics as optics;
+pub use picture::{PictureError, PictureFormat, srgb8, write_exr, write_picture, write_png};
+pub use prepare::{MAX_IMAGE, MAX_SEGMENTS, PrepareError, prepare};
+pub use residency::Residency;
+pub use scene::{Scene, Skipping};
+pub use viewpoint::{Viewpoint, ViewpointError};

@@ -1,0 +1,92 @@
+//! The backends that this build and this machine have.
+
+use std::fmt;
+
+use brickfield_cpu::CpuBackend;
+use brickfield_frame::Backend;
+
+/// A backend by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum BackendKind {
+    /// The fast f32 renderer; needs no driver.
+    Cpu,
+    /// Through wgpu.
+    Wgpu,
+    /// Raw Vulkan through ash.
+    Ash,
+}
+
+/// An adapter that a backend could use.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AdapterInfo {
+    /// Its place in the backend's list: `--adapter` takes it.
+    pub index: usize,
+    /// Its name as the driver states it: `--adapter` takes a part of it.
+    pub name: String,
+    /// The driver's name and version.
+    pub driver: String,
+}
+
+/// What there is of a backend: its adapters, or why there are none.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BackendStatus {
+    /// Which backend.
+    pub kind: BackendKind,
+    /// Its adapters, at least one; or why there is none, in a line.
+    pub adapters: Result<Vec<AdapterInfo>, String>,
+}
+
+/// Whether a backend's calls are checked by the driver's validation layer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Validation {
+    #[default]
+    Off,
+    On,
+}
+
+/// Why a backend could not be opened.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum BackendError {
+    #[error("no backend {name:?}: there are cpu, wgpu and ash")]
+    Name { name: String },
+    #[error("backend {kind} is not in this build: enable the cargo feature {kind:?}", kind = kind.name())]
+    NotBuilt { kind: BackendKind },
+    #[error("backend {kind}: {reason}", kind = kind.name())]
+    Unavailable { kind: BackendKind, reason: String },
+}
+
+impl BackendKind {
+    /// All backends; those that need no driver first.
+    pub const ALL: [BackendKind; 3] = [BackendKind::Cpu, BackendKind::Wgpu, BackendKind::Ash];
+
+    /// The name in reports and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            BackendKind::Cpu => "cpu",
+            BackendKind::Wgpu => "wgpu",
+            BackendKind::Ash => "ash",
+        }
+    }
+}
+
+impl fmt::Display for BackendKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl std::str::FromStr for BackendKind {
+    type Err = BackendError;
+    fn from_str(name: &str) -> Result<BackendKind, BackendError> {
+        let kind = BackendKind::ALL.into_iter().find(|k| k.name() == name);
+        kind.ok_or_else(|| BackendError::Name { name: name.to_owned() })
+    }
+}
+
+/// Every backend with its adapters, or the reason why it is absent.
+pub fn backends() -> Vec<BackendStatus> {
+    BackendKind::ALL.map(|kind| BackendStatus { kind, adapters: adapters(kind) }).to_vec()
+}

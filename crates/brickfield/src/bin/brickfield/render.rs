@@ -1,0 +1,55 @@
+//! `brickfield render`.
+
+use brickfield::frame::{Backend, Frame, FramePlan};
+use brickfield::options::Subject;
+use brickfield::{BackendError, PictureFormat, Residency, Scene, open_backend, prepare, write_picture};
+
+use crate::{Failure, RenderArgs};
+
+pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
+    // What can be refused is refused before any work is done.
+    PictureFormat::of(&args.out)?;
+    let mut backend = open(args)?;
+    let opened = args.input.open(&args.file)?;
+    opened.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    let transfer = args.view.transfer(&opened.volume)?;
+    let subject = Subject { frame: opened.frame, tree: args.tree.build(&opened.volume)?, transfer };
+    let scene = args.view.scene(&subject, &args.sampling)?;
+    let plan = prepare(&subject.tree, &scene, &mut Residency::default())?;
+    let frame = backend.render(&plan)?;
+    let attributes = attributes(args, backend.as_ref(), &scene);
+    write_picture(&args.out, &frame.image, args.view.background.0, &attributes)?;
+    print_summary(backend.as_ref(), &plan, &frame);
+    Ok(())
+}
+
+/// The first candidate that opens; the last one's error if none does.
+fn open(args: &RenderArgs) -> Result<Box<dyn Backend>, Failure> {
+    let mut last: Option<BackendError> = None;
+    for kind in args.candidates()? {
+        match open_backend(kind, args.adapter.as_deref(), args.validation()) {
+            Ok(backend) => return Ok(backend),
+            Err(e) => last = Some(e),
+        }
+    }
+    Err(Failure::Backend(last.expect("at least one candidate")))
+}
+
+fn attributes(args: &RenderArgs, backend: &dyn Backend, scene: &Scene) -> Vec<(&'static str, String)> {
+    let d = backend.describe();
+    vec![
+        ("scene", format!("{} {:?}", args.file.display(), scene)),
+        ("backend", d.backend.to_owned()),
+        ("adapter", format!("{} ({})", d.adapter, d.driver)),
+        ("step", format!("{} voxels", scene.step_voxels)),
+    ]
+}
+
+fn print_summary(backend: &dyn Backend, plan: &FramePlan, frame: &Frame) {
+    let d = backend.describe();
+    let t = frame.timing;
+    let device = t.device_ms.map(|ms| format!(", device {ms:.1} ms")).unwrap_or_default();
+    println!("{}: {} ({})", d.backend, d.adapter, d.driver);
+    println!("{} bricks, {:.1} MiB", plan.bricks.n_bricks(), plan.bricks.bytes().len() as f64 / f64::from(1 << 20));
+    println!("upload {:.1} ms, render {:.1} ms{device}, read back {:.1} ms", t.upload_ms, t.wall_ms, t.read_back_ms);
+}

@@ -1,0 +1,205 @@
+//! From a scene to a frame plan.
+
+use brickfield_bricks::BrickTree;
+use brickfield_core::glam::{DVec3, UVec2, UVec3};
+use brickfield_core::{Aabb, BrickId, Level};
+use brickfield_frame::{
+    Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, RayFrame, Sampling, SamplingError,
+};
+use brickfield_lod::{Culling, Selection, View, select_cut};
+use brickfield_optics::QuadratureRule;
+
+use crate::visibility::Visibility;
+use crate::{Residency, Scene, Skipping};
+
+/// Why a scene could not be prepared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum PrepareError {
+    #[error("a picture of {} x {} pixels; both sides must be 1 to {limit}", size.x, size.y)]
+    Size { size: UVec2, limit: u32 },
+    #[error("a step of {step_voxels} voxels; it must be finite and above 0")]
+    Step { step_voxels: f64 },
+    #[error("clip box from {} to {}: every lower corner must be below the upper one", clip.min, clip.max)]
+    Clip { clip: Aabb },
+    #[error("rays of {n_segments:.3e} segments; at most {limit} are possible: take a larger step")]
+    TooManySegments { n_segments: f64, limit: u32 },
+    #[error("{n_bricks} bricks; an index tells at most {limit} apart: take larger bricks or a coarser level")]
+    TooManyBricks { n_bricks: usize, limit: u32 },
+    #[error(transparent)]
+    Sampling(#[from] SamplingError),
+}
+
+/// Most pixels along a side of a picture.
+pub const MAX_IMAGE: u32 = 32_768;
+/// Most segments on a ray: an f32 counts them exactly.
+pub const MAX_SEGMENTS: u32 = 1 << 24;
+
+/// The plan of a frame: selects a cut, drops what the transfer function and the view make invisible, gathers the rest.
+///
+/// `residency` carries the bricks from frame to frame.
+///
+/// # Errors
+/// A picture size, step, clip box or number of bricks out of range.
+pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Result<FramePlan, PrepareError> {
+    check_size(scene.size)?;
+    let grid = tree.grid();
+    let domain = clipped_domain(tree, scene.clip)?;
+    let step_world = scene.step_voxels * grid.spacing().min_element();
+    if !(step_world.is_finite() && step_world > 0.0) {
+        return Err(PrepareError::Step { step_voxels: scene.step_voxels });
+    }
+    let sampling = Sampling::new(step_world, scene.rule, scene.mode)?;
+    check_segments(&grid.world_box(), step_world)?;
+    let selection = select_cut(tree.layout(), grid, &view(scene), &scene.detail);
+    let resident = resident_bricks(tree, scene, &selection, &domain);
+    if resident.len() >= IndexEntry::MAX_SLOTS as usize {
+        return Err(PrepareError::TooManyBricks { n_bricks: resident.len(), limit: IndexEntry::MAX_SLOTS });
+    }
+    let index = index_grid(tree, &resident);
+    let features = features(scene, &index, &resident);
+    Ok(FramePlan {
+        dims: grid.dims(),
+        rays: RayFrame::new(&scene.camera, grid, scene.size, &volume_box(tree), step_world),
+        domain,
+        visible: visible_box(tree, &resident, &domain),
+        sampling,
+        transfer: scene.transfer.clone(),
+        index,
+        bricks: residency.hold(tree, resident),
+        features,
+    })
+}
+
+/// Without skipping, bricks outside the view are kept, too.
+fn view(scene: &Scene) -> View {
+    let culling = match scene.skipping {
+        Skipping::On => Culling::Frustum,
+        Skipping::Off => Culling::Off,
+    };
+    View { camera: scene.camera, size: scene.size, culling }
+}
+
+fn check_size(size: UVec2) -> Result<(), PrepareError> {
+    let sides = 1..=MAX_IMAGE;
+    if sides.contains(&size.x) && sides.contains(&size.y) {
+        return Ok(());
+    }
+    Err(PrepareError::Size { size, limit: MAX_IMAGE })
+}
+
+fn check_segments(world: &Aabb, step_world: f64) -> Result<(), PrepareError> {
+    let n_segments = world.diagonal() / step_world;
+    if n_segments < f64::from(MAX_SEGMENTS) {
+        return Ok(());
+    }
+    Err(PrepareError::TooManySegments { n_segments, limit: MAX_SEGMENTS })
+}
+
+/// The volume's box in sample space.
+fn volume_box(tree: &BrickTree) -> Aabb {
+    to_sample_space(tree.grid().index_box())
+}
+
+fn to_sample_space(index: Aabb) -> Aabb {
+    Aabb { min: index.min - 0.5, max: index.max - 0.5 }
+}
+
+fn clipped_domain(tree: &BrickTree, clip: Option<Aabb>) -> Result<Aabb, PrepareError> {
+    let whole = volume_box(tree);
+    let Some(clip) = clip else { return Ok(whole) };
+    // NaN fails too.
+    if clip.is_empty() || !(clip.min.is_finite() && clip.max.is_finite()) {
+        return Err(PrepareError::Clip { clip });
+    }
+    let domain = whole.intersection(&to_sample_space(clip));
+    Ok(if domain.is_empty() { Aabb { min: domain.min, max: domain.min } } else { domain })
+}
+
+/// The bricks that the frame needs, in their slots.
+fn resident_bricks(tree: &BrickTree, scene: &Scene, selection: &Selection, domain: &Aabb) -> Vec<BrickId> {
+    if scene.skipping == Skipping::Off {
+        return selection.cut().bricks().to_vec();
+    }
+    let reach = match scene.rule {
+        QuadratureRule::PreIntegrated => segment_reach(tree, scene),
+        _ => 0,
+    };
+    let visibility = Visibility::of(tree, &scene.transfer, selection.cut().bricks(), reach);
+    let in_domain = |id: &BrickId| !to_sample_space(tree.layout().index_box(*id)).intersection(domain).is_empty();
+    selection.drawn().filter(|id| in_domain(id) && visibility.needs(*id)).collect()
+}
+
+/// How many bricks of level 0 a segment can span along an axis.
+fn segment_reach(tree: &BrickTree, scene: &Scene) -> u32 {
+    let spacing = tree.grid().spacing();
+    // A sheared direction matrix can make a world step longer in voxels than the spacing says: take the map's own norm.
+    let turn = tree.grid().world_to_index().matrix3;
+    let voxels_per_unit =
+        [turn.x_axis, turn.y_axis, turn.z_axis].into_iter().map(DVec3::length_squared).sum::<f64>().sqrt();
+    let voxels = scene.step_voxels * spacing.min_element() * voxels_per_unit;
+    (voxels / f64::from(tree.layout().side().n_cells())).ceil().min(f64::from(u32::MAX)) as u32
+}
+
+fn index_grid(tree: &BrickTree, resident: &[BrickId]) -> IndexGrid {
+    let mut index = IndexGrid::transparent(tree.layout().n_bricks(Level(0)));
+    for (slot, id) in resident.iter().enumerate() {
+        let entry = IndexEntry::Resident { slot: slot as u32, level: id.level };
+        index.fill(id.coords << u32::from(id.level.0), entry);
+    }
+    merge_transparent(&mut index);
+    index
+}
+
+/// Lets aligned blocks that are wholly transparent answer as one, so that rays cross them in one jump.
+fn merge_transparent(index: &mut IndexGrid) {
+    let mut level = Level(0);
+    while level.stride() < index.dims().max_element() {
+        let coarser = Level(level.0 + 1);
+        for low in block_corners(index.dims(), coarser) {
+            let children = block_corners_within(index.dims(), low, coarser, level);
+            if children.into_iter().all(|c| index.at(c) == IndexEntry::Transparent { level }) {
+                index.fill(low, IndexEntry::Transparent { level: coarser });
+            }
+        }
+        level = coarser;
+    }
+}
+
+fn block_corners(dims: UVec3, level: Level) -> Vec<UVec3> {
+    block_corners_in(UVec3::ZERO, dims, level)
+}
+
+fn block_corners_within(dims: UVec3, low: UVec3, block: Level, level: Level) -> Vec<UVec3> {
+    block_corners_in(low, dims.min(low + block.stride()), level)
+}
+
+fn block_corners_in(low: UVec3, high: UVec3, level: Level) -> Vec<UVec3> {
+    let steps = |a: u32, b: u32| (a..b).step_by(level.stride() as usize);
+    let rows = steps(low.z, high.z).flat_map(|z| steps(low.y, high.y).map(move |y| (y, z)));
+    rows.flat_map(|(y, z)| steps(low.x, high.x).map(move |x| UVec3::new(x, y, z))).collect()
+}
+
+fn visible_box(tree: &BrickTree, resident: &[BrickId], domain: &Aabb) -> Aabb {
+    let empty = Aabb { min: domain.min, max: domain.min };
+    let boxes = resident.iter().map(|id| to_sample_space(tree.layout().index_box(*id)));
+    let visible = boxes.reduce(|a, b| a.union(&b)).map_or(empty, |b| b.intersection(domain));
+    if visible.is_empty() { empty } else { visible }
+}
+
+fn features(scene: &Scene, index: &IndexGrid, resident: &[BrickId]) -> FeatureSet {
+    let levels_differ = resident.iter().any(|id| id.level != Level(0));
+    let any_transparent =
+        index.words().iter().any(|w| matches!(IndexEntry::unpack(*w), IndexEntry::Transparent { .. }));
+    let fast = matches!(scene.mode, Mode::Fast { .. });
+    let ends_early = matches!(scene.mode, Mode::Fast { transmittance_floor } if transmittance_floor > 0.0);
+    let needed = [
+        (Feature::HardwareFilter, fast),
+        (Feature::EarlyTermination, ends_early),
+        (Feature::SkipTransparent, any_transparent),
+        (Feature::MultiLevel, levels_differ),
+        (Feature::TransferLookup, scene.transfer.knots().len() > 1),
+    ];
+    needed.into_iter().filter(|(_, need)| *need).map(|(feature, _)| feature).collect()
+}
