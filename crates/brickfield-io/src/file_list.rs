@@ -27,7 +27,9 @@ impl FileNames {
         match self {
             FileNames::One(name) => name.clone(),
             FileNames::List(names) => names[i].clone(),
-            FileNames::Numbered { pattern, first, step, .. } => pattern.name(first + step * i as i64),
+            FileNames::Numbered { pattern, first, step, .. } => {
+                pattern.name(first.wrapping_add(step.wrapping_mul(i as i64)))
+            }
         }
     }
 

@@ -1,1 +1,41 @@
 #![doc = include_str!("../README.md")]
+
+#[cfg(feature = "gzip")]
+mod deflate;
+mod detached;
+mod error;
+mod file_list;
+mod files;
+mod format;
+mod limits;
+mod lines;
+pub mod metaimage;
+#[cfg(feature = "nifti")]
+pub mod nifti;
+mod note;
+pub mod nrrd;
+mod open;
+mod opened;
+mod placement;
+pub mod raw;
+#[cfg(feature = "nifti")]
+mod rescale;
+mod samples;
+mod save;
+mod stored;
+#[cfg(feature = "vti")]
+pub mod vti;
+
+pub use error::{OpenError, ReadError, Shown};
+pub use files::{ByteSource, DataFiles, Folder, NoFiles};
+pub use format::Format;
+pub use limits::Limits;
+pub use note::Note;
+pub use open::{detect, open, open_raw};
+pub use opened::{Opened, WorldFrame};
+pub use raw::RawSpec;
+pub use samples::ByteOrder;
+pub use save::SaveError;
+
+/// The scalar types that can be read, for messages.
+pub(crate) const SCALARS: &str = "8, 16 and 32 bit integers, 32 and 64 bit floats are";

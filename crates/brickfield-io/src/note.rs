@@ -74,7 +74,9 @@ impl fmt::Display for Note {
                 write!(f, "{n_files} files are no slices and were skipped, first {first:?}: {reason}")
             }
             Note::SurplusData => f.write_str("the data go on after the last voxel that the header promises"),
-            Note::LowIsBright => f.write_str("the file wants low values shown bright (MONOCHROME1); values are as stored"),
+            Note::LowIsBright => {
+                f.write_str("the file wants low values shown bright (MONOCHROME1); values are as stored")
+            }
         }
     }
 }

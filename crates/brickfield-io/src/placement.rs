@@ -34,10 +34,7 @@ impl Placement {
     }
 
     pub(crate) fn scaled(self, factors: DVec3) -> Placement {
-        Placement {
-            first_sample: self.first_sample * factors,
-            steps: DMat3::from_diagonal(factors) * self.steps,
-        }
+        Placement { first_sample: self.first_sample * factors, steps: DMat3::from_diagonal(factors) * self.steps }
     }
 
     /// # Errors

@@ -51,7 +51,11 @@ impl Stored {
     ) -> Result<(), ReadError> {
         for _ in 0..self.line_skip {
             if skip_line(source).map_err(|e| ReadError::io(part.name, e))? == 0 {
-                return Err(ReadError::field("line skip", self.line_skip, format!("at most the lines of {}", part.name)));
+                return Err(ReadError::field(
+                    "line skip",
+                    self.line_skip,
+                    format!("at most the lines of {}", part.name),
+                ));
             }
         }
         let expected_bytes = part.n_samples.saturating_mul(sample_bytes as u128);

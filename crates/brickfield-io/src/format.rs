@@ -1,0 +1,142 @@
+//! The formats, and telling them apart by content first, by extension second.
+
+use std::fmt;
+use std::path::Path;
+
+use crate::metaimage;
+
+/// A volume file format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum Format {
+    Nrrd,
+    MetaImage,
+    Nifti,
+    Vti,
+    Dicom,
+    OmeZarr,
+    Tiff,
+    Raw,
+}
+
+impl Format {
+    /// All formats.
+    pub const ALL: [Format; 8] = [
+        Format::Nrrd,
+        Format::MetaImage,
+        Format::Nifti,
+        Format::Vti,
+        Format::Dicom,
+        Format::OmeZarr,
+        Format::Tiff,
+        Format::Raw,
+    ];
+
+    /// What people call it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Format::Nrrd => "NRRD",
+            Format::MetaImage => "MetaImage",
+            Format::Nifti => "NIfTI",
+            Format::Vti => "VTK XML ImageData",
+            Format::Dicom => "DICOM",
+            Format::OmeZarr => "OME-Zarr",
+            Format::Tiff => "TIFF",
+            Format::Raw => "raw",
+        }
+    }
+
+    /// Usual ends of file names, in lower case, without the dot.
+    pub const fn extensions(self) -> &'static [&'static str] {
+        match self {
+            Format::Nrrd => &["nrrd", "nhdr"],
+            Format::MetaImage => &["mha", "mhd"],
+            Format::Nifti => &["nii", "nii.gz", "hdr", "hdr.gz"],
+            Format::Vti => &["vti"],
+            Format::Dicom => &["dcm", "dicom", "ima"],
+            Format::OmeZarr => &["zarr"],
+            Format::Tiff => &["tif", "tiff"],
+            Format::Raw => &["raw", "bin"],
+        }
+    }
+
+    /// Whether [`open`](crate::open) in this build can read it. Raw files need [`open_raw`](crate::open_raw).
+    pub const fn is_readable(self) -> bool {
+        match self {
+            Format::Nrrd | Format::MetaImage => true,
+            Format::Nifti => cfg!(feature = "nifti"),
+            Format::Vti => cfg!(feature = "vti"),
+            Format::Dicom => cfg!(feature = "dicom"),
+            Format::OmeZarr => cfg!(feature = "ome-zarr"),
+            Format::Tiff => cfg!(feature = "tiff"),
+            Format::Raw => false,
+        }
+    }
+
+    /// The format that the end of the file's name suggests.
+    pub fn from_extension(path: &Path) -> Option<Format> {
+        let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
+        let ends = |extension: &&str| name.strip_suffix(*extension).is_some_and(|stem| stem.ends_with('.'));
+        Format::ALL.into_iter().find(|format| format.extensions().iter().any(ends))
+    }
+
+    /// The format whose magic these first bytes of a file have. 352 bytes suffice, 4 KiB are better.
+    ///
+    /// A gzip wrapper has to be taken off before: of NIfTI it is usual, of the others it is none.
+    pub fn from_magic(head: &[u8]) -> Option<Format> {
+        if head.starts_with(b"NRRD00") {
+            Some(Format::Nrrd)
+        } else if head.get(128..132) == Some(b"DICM") {
+            Some(Format::Dicom)
+        } else if is_nifti(head) {
+            Some(Format::Nifti)
+        } else if is_tiff(head) {
+            Some(Format::Tiff)
+        } else if head[..head.len().min(4096)].windows(8).any(|w| w == b"<VTKFile") {
+            Some(Format::Vti)
+        } else if metaimage::has_magic(head) {
+            Some(Format::MetaImage)
+        } else {
+            None
+        }
+    }
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// NIfTI-1 by its magic, or by the header size that ANALYZE and NIfTI share; NIfTI-2 by its header size.
+fn is_nifti(head: &[u8]) -> bool {
+    let magic = head.get(344..348);
+    let size = head.first_chunk::<4>().map(|b| (u32::from_le_bytes(*b), u32::from_be_bytes(*b)));
+    matches!(magic, Some(b"n+1\0" | b"ni1\0")) || matches!(size, Some((348 | 540, _) | (_, 348 | 540)))
+}
+
+fn is_tiff(head: &[u8]) -> bool {
+    let classic_or_big = |a, b| matches!((a, b), (42 | 43, 0));
+    match head {
+        [b'I', b'I', a, b, ..] => classic_or_big(*a, *b),
+        [b'M', b'M', b, a, ..] => classic_or_big(*a, *b),
+        _ => false,
+    }
+}
+
+/// Formats that are known well enough to be named in an error.
+pub(crate) fn foreign(head: &[u8]) -> Option<&'static str> {
+    const MAGICS: [(&[u8], &str); 9] = [
+        (b" BDV", "OpenVDB"),
+        (b"\x89HDF", "HDF5"),
+        (b"\x89PNG", "PNG"),
+        (b"\xff\xd8\xff", "JPEG"),
+        (b"# vtk DataFile", "legacy VTK"),
+        (b"VOLS\n", "SDSC VOL"),
+        (b"VOLB\n", "SDSC VOL"),
+        (b"\0\0\0\x0cjP", "JPEG 2000"),
+        (b"PK\x03\x04", "zip archive"),
+    ];
+    MAGICS.into_iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, name)| name)
+}

@@ -1,0 +1,261 @@
+//! MetaImage, .mha and .mhd (MetaIO documentation, itk.org/Wiki/ITK/MetaIO/Documentation).
+//!
+//! Data LOCAL, in one file, a LIST or a pattern; binary, zlib and text; both byte orders; HeaderSize.
+//! Not: more than one value per voxel. CenterOfRotation is ignored, as ITK does.
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, Seek};
+
+use brickfield_core::glam::DVec3;
+use brickfield_core::{ScalarType, Voxels};
+
+use crate::detached::read_detached;
+use crate::error::Shown;
+use crate::file_list::FileNames;
+use crate::files::ByteSource;
+use crate::limits::Shape;
+use crate::lines::{HeaderLines, numbers};
+use crate::opened::Found;
+use crate::placement::{AXES, Placement, usable_spacing};
+use crate::samples::allocate;
+use crate::stored::{ByteSkip, Encoding, Part, Stored};
+use crate::{ByteOrder, DataFiles, Format, Limits, Note, Opened, ReadError, WorldFrame};
+
+/// Reads a MetaImage from its header on; `files` finds detached data.
+///
+/// The world is the file's own. It is [`WorldFrame::Lps`] if the header has an AnatomicalOrientation, for that is what
+/// ITK takes it to be. `Offset` is the first sample's centre; row i of TransformMatrix is the direction of axis i.
+///
+/// # Errors
+/// What [`ReadError`] lists: a header that is wrong, unsupported or beyond the limits; data that are missing.
+pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, limits: &Limits) -> Result<Opened, ReadError> {
+    read_from(&mut input, files, limits)
+}
+
+fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, limits: &Limits) -> Result<Opened, ReadError> {
+    let header = Header::read(source)?;
+    let scalar = header.scalar()?;
+    let stored = header.stored()?;
+    let mut found = Found::plain(Format::MetaImage);
+    let shape = Shape::claim(header.volume_dims(&mut found.notes), scalar, limits)?;
+    let grid = header.placement(&mut found.notes)?.grid(shape.dims)?;
+    let voxels = match &header.data {
+        Some(names) => read_detached(names, header.n_samples(), &shape, &stored, files, &mut found.notes)?,
+        None => read_local(source, &header, &shape, &stored, &mut found.notes)?,
+    };
+    found.frame = header.frame();
+    found.finish(grid, voxels)
+}
+
+fn read_local(
+    source: &mut dyn ByteSource,
+    header: &Header,
+    shape: &Shape,
+    stored: &Stored,
+    notes: &mut Vec<Note>,
+) -> Result<Voxels, ReadError> {
+    let part = Part { name: "the data after the header", n_samples: header.n_samples(), n_wanted: shape.n_voxels() };
+    stored.seek_samples(source, &part, shape.scalar.n_bytes())?;
+    let mut voxels = allocate(shape)?;
+    stored.append(&mut voxels, source, &part, notes)?;
+    Ok(voxels)
+}
+
+struct Header {
+    fields: BTreeMap<String, String>,
+    sizes: Vec<u64>,
+    /// Nothing if the data follow the header.
+    data: Option<FileNames>,
+}
+
+const MAX_AXES: usize = 10;
+
+/// Keys with which a MetaImage header begins, in lower case.
+const FIRST_KEYS: [&str; 8] =
+    ["objecttype", "ndims", "comment", "name", "id", "objectsubtype", "transformtype", "binarydata"];
+
+/// Whether this is how a MetaImage begins: a known key, then `=`.
+pub(crate) fn has_magic(head: &[u8]) -> bool {
+    let line = head.split(|b| *b == b'\n').next().unwrap_or(&[]);
+    let Some(end) = line.iter().position(|b| *b == b'=') else { return false };
+    let key = String::from_utf8_lossy(&line[..end]).trim().to_ascii_lowercase();
+    FIRST_KEYS.contains(&key.as_str())
+}
+
+impl Header {
+    /// Reads up to ElementDataFile; the source is then at the first byte of local data.
+    fn read(source: &mut dyn ByteSource) -> Result<Header, ReadError> {
+        let mut lines = HeaderLines::new(source);
+        let mut fields = BTreeMap::new();
+        let mut is_first = true;
+        while let Some(line) = lines.next_line()? {
+            if std::mem::take(&mut is_first) && !has_magic(line.as_bytes()) {
+                return Err(wrong_magic(&line));
+            }
+            let Some((key, value)) = line.split_once('=') else { continue };
+            let (key, value) = (key.trim().to_ascii_lowercase(), value.trim().to_owned());
+            if key == "elementdatafile" {
+                let sizes = read_sizes(&fields)?;
+                let data = file_names(&value, &sizes, &mut lines)?;
+                return Ok(Header { fields, sizes, data });
+            }
+            fields.insert(key, value);
+        }
+        Err(ReadError::Missing { field: "ElementDataFile" })
+    }
+
+    fn text(&self, keys: &[&str]) -> Option<&str> {
+        keys.iter().find_map(|key| self.fields.get(*key)).map(String::as_str)
+    }
+
+    fn is_true(&self, keys: &[&str]) -> bool {
+        self.text(keys).is_some_and(|v| matches!(v.as_bytes(), [b'T' | b't' | b'1' | b'Y' | b'y', ..]))
+    }
+
+    fn n_samples(&self) -> u128 {
+        self.sizes.iter().fold(1u128, |n, s| n.saturating_mul(u128::from(*s)))
+    }
+
+    fn scalar(&self) -> Result<ScalarType, ReadError> {
+        if let Some(channels) = self.text(&["elementnumberofchannels"]).filter(|v| *v != "1") {
+            return Err(ReadError::unsupported("ElementNumberOfChannels", channels, "1 is"));
+        }
+        let name = self.text(&["elementtype"]).ok_or(ReadError::Missing { field: "ElementType" })?;
+        Ok(match name {
+            "MET_UCHAR" => ScalarType::U8,
+            "MET_CHAR" => ScalarType::I8,
+            "MET_USHORT" => ScalarType::U16,
+            "MET_SHORT" => ScalarType::I16,
+            "MET_UINT" | "MET_ULONG" => ScalarType::U32,
+            "MET_INT" | "MET_LONG" => ScalarType::I32,
+            "MET_FLOAT" => ScalarType::F32,
+            "MET_DOUBLE" => ScalarType::F64,
+            _ => return Err(ReadError::unsupported("ElementType", name, crate::SCALARS)),
+        })
+    }
+
+    fn stored(&self) -> Result<Stored, ReadError> {
+        let order = match self.is_true(&["binarydatabyteordermsb", "elementbyteordermsb"]) {
+            true => ByteOrder::Big,
+            false => ByteOrder::Little,
+        };
+        let byte_skip = match self.text(&["headersize"]) {
+            None => ByteSkip::Bytes(0),
+            Some("-1") => ByteSkip::ToFitEnd,
+            Some(text) => text
+                .parse()
+                .map(ByteSkip::Bytes)
+                .map_err(|_| ReadError::field("HeaderSize", text, "an integer of at least -1"))?,
+        };
+        Ok(Stored { encoding: self.encoding()?, order, line_skip: 0, byte_skip })
+    }
+
+    fn encoding(&self) -> Result<Encoding, ReadError> {
+        match (
+            self.text(&["binarydata"]).is_some() && !self.is_true(&["binarydata"]),
+            self.is_true(&["compresseddata"]),
+        ) {
+            (true, _) => Ok(Encoding::Text),
+            (false, false) => Ok(Encoding::Raw),
+            #[cfg(feature = "gzip")]
+            (false, true) => Ok(Encoding::Deflate),
+            #[cfg(not(feature = "gzip"))]
+            (false, true) => Err(ReadError::FeatureOff { format: Format::MetaImage, feature: "gzip" }),
+        }
+    }
+
+    fn volume_dims(&self, notes: &mut Vec<Note>) -> [u64; 3] {
+        for (axis, n_entries) in self.sizes.iter().enumerate().skip(3).filter(|(_, n)| **n > 1) {
+            notes.push(Note::FirstOfAxis { axis: axis.to_string(), n_entries: *n_entries });
+        }
+        [0, 1, 2].map(|axis| self.sizes.get(axis).copied().unwrap_or(1))
+    }
+
+    fn placement(&self, notes: &mut Vec<Note>) -> Result<Placement, ReadError> {
+        let n_axes = self.sizes.len();
+        let spacing = self.numbers(&["elementspacing", "elementsize"], "ElementSpacing", n_axes)?;
+        let offset = self.numbers(&["offset", "origin", "position"], "Offset", n_axes)?.unwrap_or_default();
+        let matrix =
+            self.numbers(&["transformmatrix", "orientation", "rotation"], "TransformMatrix", n_axes * n_axes)?;
+        let steps = (0..n_axes.min(3)).map(|axis| {
+            let length = spacing.as_ref().map_or(1.0, |s| usable_spacing(s[axis], AXES[axis], notes));
+            let direction = matrix.as_ref().map_or(DVec3::AXES[axis], |m| vector(&m[axis * n_axes..][..n_axes]));
+            direction * length
+        });
+        let steps: Vec<DVec3> = steps.collect();
+        Ok(Placement::from_axes(&steps, vector(&offset)))
+    }
+
+    fn numbers(&self, keys: &[&str], field: &'static str, n: usize) -> Result<Option<Vec<f64>>, ReadError> {
+        let Some(text) = self.text(keys) else { return Ok(None) };
+        let values = numbers::<f64>(field, text)?;
+        match values.len() == n {
+            true => Ok(Some(values)),
+            false => Err(ReadError::field(field, text, format!("{n} numbers"))),
+        }
+    }
+
+    fn frame(&self) -> WorldFrame {
+        match self.text(&["anatomicalorientation"]) {
+            Some(text) if !text.contains('?') && !text.is_empty() => WorldFrame::Lps,
+            _ => WorldFrame::Plain,
+        }
+    }
+}
+
+/// Up to three components; missing ones are 0.
+fn vector(components: &[f64]) -> DVec3 {
+    let at = |i: usize| components.get(i).copied().unwrap_or(0.0);
+    DVec3::new(at(0), at(1), at(2))
+}
+
+fn wrong_magic(line: &str) -> ReadError {
+    ReadError::WrongMagic {
+        format: Format::MetaImage,
+        what: "the first line",
+        found: Shown::new(line),
+        expected: "a key such as ObjectType or NDims, and =",
+    }
+}
+
+fn read_sizes(fields: &BTreeMap<String, String>) -> Result<Vec<u64>, ReadError> {
+    let n_axes = fields.get("ndims").ok_or(ReadError::Missing { field: "NDims" })?;
+    let expected = || format!("1 to {MAX_AXES}");
+    let n: usize = n_axes.parse().map_err(|_| ReadError::field("NDims", n_axes, expected()))?;
+    if !(1..=MAX_AXES).contains(&n) {
+        return Err(ReadError::field("NDims", n_axes, expected()));
+    }
+    let text = fields.get("dimsize").ok_or(ReadError::Missing { field: "DimSize" })?;
+    let sizes = numbers::<u64>("DimSize", text)?;
+    if sizes.len() != n || sizes.contains(&0) {
+        return Err(ReadError::field("DimSize", text, format!("{n} numbers of at least 1")));
+    }
+    Ok(sizes)
+}
+
+/// The value of ElementDataFile; after LIST, the names follow line by line.
+fn file_names(value: &str, sizes: &[u64], lines: &mut HeaderLines) -> Result<Option<FileNames>, ReadError> {
+    let words: Vec<&str> = value.split_whitespace().collect();
+    Ok(Some(match *words.as_slice() {
+        [] => return Err(ReadError::field("ElementDataFile", value, "LOCAL, LIST, a pattern or a file name")),
+        ["LOCAL" | "Local" | "local"] => return Ok(None),
+        ["LIST", ..] => FileNames::List(read_list(lines)?),
+        [pattern, first, last, step] if pattern.contains('%') => FileNames::numbered(pattern, [first, last, step])?,
+        [pattern, first, last] if pattern.contains('%') => FileNames::numbered(pattern, [first, last, "1"])?,
+        [pattern] if pattern.contains('%') => {
+            let last = sizes.last().copied().unwrap_or(1).to_string();
+            FileNames::numbered(pattern, ["1", &last, "1"])?
+        }
+        _ => FileNames::One(value.to_owned()),
+    }))
+}
+
+fn read_list(lines: &mut HeaderLines) -> Result<Vec<String>, ReadError> {
+    let mut names = Vec::new();
+    while let Some(line) = lines.next_line()? {
+        if !line.trim().is_empty() {
+            names.push(line.trim().to_owned());
+        }
+    }
+    Ok(names)
+}

@@ -1,0 +1,184 @@
+//! Opening a path, whatever format it is in.
+
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+use std::path::Path;
+
+use crate::error::Shown;
+use crate::files::{open_regular, read_head};
+use crate::format::foreign;
+use crate::{Folder, Format, Limits, OpenError, Opened, RawSpec, ReadError, metaimage, nrrd, raw};
+
+/// Opens a volume: a file, or a folder of DICOM slices or OME-Zarr.
+///
+/// The format is told by content where it has a magic, else by extension.
+///
+/// # Errors
+/// One line that names the path, what is wrong, the value and the bound.
+pub fn open(path: &Path, limits: &Limits) -> Result<Opened, OpenError> {
+    let format = detect(path)?;
+    let opened = match path.is_dir() {
+        true => open_folder(path, format, limits),
+        false => open_file(path, format, limits),
+    };
+    opened.map_err(|fault| OpenError::new(path, fault))
+}
+
+/// Opens raw voxels of a given shape.
+///
+/// # Errors
+/// One line that names the path, what is wrong, the value and the bound.
+pub fn open_raw(path: &Path, spec: &RawSpec, limits: &Limits) -> Result<Opened, OpenError> {
+    let read = || raw::read(buffered(path)?, spec, limits);
+    read().map_err(|fault| OpenError::new(path, fault))
+}
+
+/// The format of a file or folder: by content where it has a magic, else by extension.
+///
+/// # Errors
+/// If there is no such file, if it is empty, or if neither content nor extension is known.
+pub fn detect(path: &Path) -> Result<Format, OpenError> {
+    let format = match path.is_dir() {
+        true => detect_folder(path),
+        false => detect_file(path),
+    };
+    format.map_err(|fault| OpenError::new(path, fault))
+}
+
+const HEAD_BYTES: u64 = 4096;
+
+fn detect_file(path: &Path) -> Result<Format, ReadError> {
+    let mut file = buffered(path)?;
+    let head = read_head(&mut file, HEAD_BYTES)?;
+    if head.is_empty() {
+        return Err(ReadError::Empty);
+    }
+    if let Some(name) = foreign(&head) {
+        return Err(ReadError::unsupported("format", name, "NRRD, MetaImage, NIfTI, VTI, DICOM, OME-Zarr, TIFF are"));
+    }
+    let inner = ungzipped(&head);
+    match Format::from_magic(inner.as_deref().unwrap_or(&head)) {
+        Some(format) if inner.is_none() || format == Format::Nifti => Ok(format),
+        Some(format) => Err(ReadError::unsupported("gzip around", format, "around NIfTI it is; unpack it first")),
+        None => Format::from_extension(path).ok_or(ReadError::UnknownFormat { found: Shown::of_bytes(&head) }),
+    }
+}
+
+/// The first bytes inside a gzip wrapper, if there is one.
+fn ungzipped(head: &[u8]) -> Option<Vec<u8>> {
+    #[cfg(feature = "gzip")]
+    if head.starts_with(&[0x1f, 0x8b]) {
+        let mut inner = vec![0; HEAD_BYTES as usize];
+        let mut gz = flate2::read::GzDecoder::new(head);
+        let mut n = 0;
+        // The head of the wrapper is cut off somewhere, so an error ends it as well.
+        while let Ok(m @ 1..) = gz.read(&mut inner[n..]) {
+            n += m;
+        }
+        inner.truncate(n);
+        return Some(inner);
+    }
+    let _ = head;
+    None
+}
+
+fn detect_folder(path: &Path) -> Result<Format, ReadError> {
+    let zarr_marks = ["zarr.json", ".zattrs", ".zgroup", ".zarray"];
+    if zarr_marks.iter().any(|mark| path.join(mark).is_file()) {
+        return Ok(Format::OmeZarr);
+    }
+    let n_entries = path.read_dir().map_err(|e| ReadError::io("the folder", e))?.count();
+    match has_slice(path).map_err(|e| ReadError::io("the folder", e))? {
+        true => Ok(Format::Dicom),
+        false => Err(ReadError::UnknownFolder { n_entries }),
+    }
+}
+
+fn has_slice(folder: &Path) -> io::Result<bool> {
+    for entry in folder.read_dir()? {
+        if let Ok(format) = detect_file(&entry?.path())
+            && format == Format::Dicom
+        {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+fn buffered(path: &Path) -> Result<BufReader<File>, ReadError> {
+    let file = open_regular(path).map_err(|e| ReadError::io("the file", e))?;
+    Ok(BufReader::with_capacity(1 << 16, file))
+}
+
+fn open_file(path: &Path, format: Format, limits: &Limits) -> Result<Opened, ReadError> {
+    let mut file = buffered(path)?;
+    let folder = Folder(path.parent().unwrap_or(Path::new("")).to_owned());
+    match format {
+        Format::Nrrd => nrrd::read(file, &folder, limits),
+        Format::MetaImage => metaimage::read(file, &folder, limits),
+        #[cfg(feature = "nifti")]
+        Format::Nifti => crate::nifti::read(file, &stem(path), &folder, limits),
+        #[cfg(feature = "vti")]
+        Format::Vti => crate::vti::read(file, limits),
+        #[cfg(any())] //dicom
+        Format::Dicom => crate::dicom::read(&[file_name(path)], &folder, limits),
+        #[cfg(any())] //tiff
+        Format::Tiff => crate::tiff::read(file, limits),
+        Format::Raw => Err(ReadError::Missing { field: "the shape of a raw file (dims and type; see open_raw)" }),
+        Format::OmeZarr => Err(ReadError::UnknownFormat { found: Shown::of_bytes(&read_head(&mut file, 16)?) }),
+        #[allow(unreachable_patterns)]
+        _ => Err(feature_off(format)),
+    }
+}
+
+fn open_folder(path: &Path, format: Format, limits: &Limits) -> Result<Opened, ReadError> {
+    match format {
+        #[cfg(any())] //dicom
+        Format::Dicom => {
+            let names = file_names(path).map_err(|e| ReadError::io("the folder", e))?;
+            crate::dicom::read(&names, &Folder(path.to_owned()), limits)
+        }
+        #[cfg(any())] //ome-zarr
+        Format::OmeZarr => crate::ome_zarr::read(path, limits),
+        _ => Err(feature_off(format)),
+    }
+}
+
+fn feature_off(format: Format) -> ReadError {
+    let feature = match format {
+        Format::Nifti => "nifti",
+        Format::Vti => "vti",
+        Format::Dicom => "dicom",
+        Format::OmeZarr => "ome-zarr",
+        Format::Tiff => "tiff",
+        _ => "default",
+    };
+    ReadError::FeatureOff { format, feature }
+}
+
+#[cfg(any())] //dicom
+fn file_name(path: &Path) -> String {
+    path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// The file's name without `.hdr` or `.hdr.gz`.
+#[cfg(feature = "nifti")]
+fn stem(path: &Path) -> String {
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let plain = name.strip_suffix(".gz").unwrap_or(&name);
+    plain.rsplit_once('.').map_or(plain, |(stem, _)| stem).to_owned()
+}
+
+/// Names of the regular files in a folder, in order.
+#[cfg(any())] //dicom
+fn file_names(folder: &Path) -> io::Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in folder.read_dir()? {
+        let path = entry?.path();
+        if path.is_file() {
+            names.push(file_name(&path));
+        }
+    }
+    names.sort();
+    Ok(names)
+}

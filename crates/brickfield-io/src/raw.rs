@@ -1,0 +1,62 @@
+//! Raw voxels: a file that says nothing about itself, so the caller does.
+
+use std::io::{BufRead, Seek};
+use std::path::Path;
+
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{ScalarType, Volume};
+
+use crate::limits::Shape;
+use crate::opened::Found;
+use crate::placement::Placement;
+use crate::samples::allocate;
+use crate::save::{SaveError, save_atomically, write_samples};
+use crate::stored::{ByteSkip, Encoding, Part, Stored};
+use crate::{ByteOrder, Format, Limits, Opened, ReadError};
+
+/// What has to be known about a raw file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RawSpec {
+    /// Voxels along x (fastest), y, z.
+    pub dims: UVec3,
+    /// The type of one sample.
+    pub scalar: ScalarType,
+    /// Which end of a sample comes first.
+    pub order: ByteOrder,
+    /// Bytes before the first sample.
+    pub skip_bytes: u64,
+    /// World units between samples.
+    pub spacing: DVec3,
+}
+
+impl RawSpec {
+    /// Little-endian, from the first byte on, spacing 1.
+    pub fn new(dims: UVec3, scalar: ScalarType) -> RawSpec {
+        RawSpec { dims, scalar, order: ByteOrder::Little, skip_bytes: 0, spacing: DVec3::ONE }
+    }
+}
+
+/// Reads raw voxels. The outer corner of the first voxel is the world's origin.
+///
+/// # Errors
+/// What [`ReadError`] lists: a shape beyond the limits or the file, a spacing that is not above 0.
+pub fn read(mut input: impl BufRead + Seek, spec: &RawSpec, limits: &Limits) -> Result<Opened, ReadError> {
+    let shape = Shape::claim(spec.dims.to_array().map(u64::from), spec.scalar, limits)?;
+    let grid = Placement::axis_aligned(spec.spacing, 0.5 * spec.spacing).grid(shape.dims)?;
+    let byte_skip = ByteSkip::Bytes(spec.skip_bytes);
+    let stored = Stored { encoding: Encoding::Raw, order: spec.order, line_skip: 0, byte_skip };
+    let part = Part { name: "the file", n_samples: shape.n_voxels() as u128, n_wanted: shape.n_voxels() };
+    stored.seek_samples(&mut input, &part, spec.scalar.n_bytes())?;
+    let mut found = Found::plain(Format::Raw);
+    let mut voxels = allocate(&shape)?;
+    stored.append(&mut voxels, &mut input, &part, &mut found.notes)?;
+    found.finish(grid, voxels)
+}
+
+/// Saves the voxels alone, x fastest: whole or not at all, for the file is renamed into place.
+///
+/// # Errors
+/// If the folder cannot be written to.
+pub fn save(path: &Path, volume: &Volume, order: ByteOrder) -> Result<(), SaveError> {
+    save_atomically(path, |out| write_samples(out, volume.voxels(), order))
+}

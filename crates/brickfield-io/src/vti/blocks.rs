@@ -1,0 +1,117 @@
+//! What precedes binary data, and zlib blocks.
+
+use std::io::{self, Read};
+
+use flate2::read::ZlibDecoder;
+
+use super::document::WordSize;
+use crate::deflate::check_ratio;
+use crate::limits::Shape;
+use crate::samples::fill;
+use crate::stored::check_length;
+use crate::{ByteOrder, ReadError};
+
+/// Reads the words of a data header.
+pub(super) struct WordReader<'a> {
+    pub(super) reader: &'a mut dyn Read,
+    pub(super) size: WordSize,
+    pub(super) order: ByteOrder,
+    pub(super) what: &'a str,
+}
+
+impl WordReader<'_> {
+    fn next(&mut self) -> Result<u64, ReadError> {
+        let mut bytes = [0; 8];
+        let n_expected = self.size.n_bytes();
+        let n = fill(self.reader, &mut bytes[..n_expected]).map_err(|e| ReadError::io(self.what, e))?;
+        check_length(self.what, n as u64, n_expected as u128)?;
+        Ok(match (self.order, self.size) {
+            (ByteOrder::Little, _) => u64::from_le_bytes(bytes),
+            (ByteOrder::Big, WordSize::Eight) => u64::from_be_bytes(bytes),
+            (ByteOrder::Big, WordSize::Four) => u64::from_be_bytes(bytes) >> 32,
+        })
+    }
+}
+
+impl WordSize {
+    pub(super) fn n_bytes(self) -> usize {
+        match self {
+            WordSize::Four => 4,
+            WordSize::Eight => 8,
+        }
+    }
+}
+
+/// The header of data that are not compressed: their length.
+///
+/// A length of 32 bits wraps round in files of 4 GiB and more, which VTK reads all the same.
+pub(super) fn check_plain(words: &mut WordReader, n_left: u64, shape: &Shape) -> Result<(), ReadError> {
+    let stated = words.next()?;
+    let expected = match words.size {
+        WordSize::Four => shape.n_bytes() & 0xffff_ffff,
+        WordSize::Eight => shape.n_bytes(),
+    };
+    if stated != expected {
+        let expected = format!("{expected}, from the extent and the type");
+        return Err(ReadError::field(format!("length of {}", words.what), stated, expected));
+    }
+    check_length(words.what, n_left, u128::from(shape.n_bytes()))
+}
+
+/// zlib blocks, decoded one after the other.
+pub(super) struct Blocks<'a> {
+    source: &'a mut dyn Read,
+    /// Bytes of each block, compressed and not; the last one first.
+    sizes: Vec<(u64, u64)>,
+    block: Vec<u8>,
+    n_given: usize,
+}
+
+/// The header of compressed data: number of blocks, their size, the size of a partial last one, compressed sizes.
+pub(super) fn read_blocks<'a>(mut words: WordReader<'a>, n_left: u64, shape: &Shape) -> Result<Blocks<'a>, ReadError> {
+    let what = words.what;
+    let [n_blocks, block_bytes, partial_bytes] = [words.next()?, words.next()?, words.next()?];
+    let n_whole = if partial_bytes > 0 { n_blocks.saturating_sub(1) } else { n_blocks };
+    let n_bytes = u128::from(n_whole) * u128::from(block_bytes) + u128::from(partial_bytes);
+    if n_bytes != u128::from(shape.n_bytes()) {
+        let expected = format!("{}, from the extent and the type", shape.n_bytes());
+        return Err(ReadError::field(format!("length of {what}"), n_bytes, expected));
+    }
+    check_length(what, n_left, u128::from(n_blocks) * words.size.n_bytes() as u128)?;
+    check_ratio(what, n_left, n_bytes)?;
+    let mut sizes = Vec::new();
+    for i in 0..n_blocks {
+        let n = if i < n_whole { block_bytes } else { partial_bytes };
+        sizes.push((words.next()?, n));
+    }
+    sizes.reverse();
+    Ok(Blocks { source: words.reader, sizes, block: Vec::new(), n_given: 0 })
+}
+
+impl Blocks<'_> {
+    fn decode_next(&mut self, n_compressed: u64, n_bytes: u64) -> io::Result<()> {
+        self.block.clear();
+        self.n_given = 0;
+        let mut compressed = (&mut *self.source).take(n_compressed);
+        ZlibDecoder::new(&mut compressed).take(n_bytes).read_to_end(&mut self.block)?;
+        if self.block.len() as u64 != n_bytes {
+            let message = format!("a block holds {} bytes; {n_bytes} are promised", self.block.len());
+            return Err(io::Error::new(io::ErrorKind::InvalidData, message));
+        }
+        io::copy(&mut compressed, &mut io::sink()).map(|_| ())
+    }
+}
+
+impl Read for Blocks<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        while self.n_given == self.block.len() {
+            match self.sizes.pop() {
+                Some((n_compressed, n_bytes)) => self.decode_next(n_compressed, n_bytes)?,
+                None => return Ok(0),
+            }
+        }
+        let n = (&self.block[self.n_given..]).read(buffer)?;
+        self.n_given += n;
+        Ok(n)
+    }
+}
