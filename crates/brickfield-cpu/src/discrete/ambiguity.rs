@@ -1,0 +1,159 @@
+//! By how much a pixel could change because f32 puts a node on the other side of a jump.
+//!
+//! **Distance.** A position in f32 is anchor + direction (t - t_anchor), relative to the frame's centre. Each of its terms is
+//! the result of at most eight roundings (three products and two sums for the anchor, the same and a normalisation for
+//! the direction, a product and a sum for t), each of at most 2^-24 of the term. So along an axis a position is off by at
+//! most 8 * 2^-24 * (|anchor| + |direction| (|t| + |t_anchor|)), a few times the volume's extent times 5e-7.
+//!
+//! **Value.** The interpolated value moves by at most that distance times the range of its cell, and by eight more
+//! roundings of the numbers that decoding adds up.
+//!
+//! **Bound.** A segment that may have depth d' and emission e' instead of d and e changes a channel by at most
+//! T (|e' - e| + |e^-d' - e^-d|), T being the transmittance before it: what lies behind has colours of at most 1. Segments
+//! change one after the other; T is taken with the least depths that the segments before may have. The sum is a bound.
+
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{Aabb, Span};
+use brickfield_frame::{FramePlan, IndexEntry, PlanRay};
+use brickfield_optics::{Segment, alpha, transmittance};
+
+use super::field::{Field, Stored};
+use super::walk::{Part, clip, segments};
+use super::{relative, segment};
+
+/// Roundings of a term, times the unit roundoff of f32.
+const ROUNDING: f64 = 8.0 / (1u32 << 24) as f64;
+
+/// What makes a plan's pixels ambiguous.
+pub(super) struct Ambiguity {
+    several_levels: bool,
+    /// The values at which the transfer function jumps, ascending.
+    jumps: Vec<f64>,
+    /// The greatest extinction of the transfer function.
+    max_extinction: f64,
+}
+
+/// The values that a node may have; the first is the one it has in f64.
+type Values = Vec<Option<f64>>;
+
+impl Ambiguity {
+    pub(super) fn new<S: Stored>(field: &Field<S>) -> Ambiguity {
+        let knots = field.plan.transfer.knots();
+        let optics = |i: usize| (knots[i].extinction, knots[i].color);
+        let jump = |i: &usize| knots[*i].value == knots[i + 1].value && optics(*i) != optics(i + 1);
+        Ambiguity {
+            several_levels: has_several_levels(field.plan),
+            jumps: (0..knots.len() - 1).filter(jump).map(|i| knots[i].value).collect(),
+            max_extinction: knots.iter().map(|k| k.extinction).fold(0.0, f64::max),
+        }
+    }
+
+    /// The most by which a channel of the ray's pixel may change.
+    pub(super) fn of_ray<S: Stored>(&self, field: &Field<S>, ray: &PlanRay) -> f64 {
+        let plan = field.plan;
+        let domain = relative(&plan.domain, plan.rays.center);
+        let least = -plan.rays.start;
+        let far = domain.extent().length() / ray.direction.length() + ray.t_anchor.abs();
+        let delta = distance(ray, far);
+        match clip(ray, &domain, least) {
+            Some(_) if clip(ray, &grown(&domain, -delta), least).is_none() => self.grazing(ray, &domain, delta, least),
+            None => self.grazing(ray, &domain, delta, least),
+            Some(span) if self.several_levels || !self.jumps.is_empty() => self.inside(field, ray, span),
+            Some(_) => 0.0,
+        }
+    }
+
+    /// The opacity that a ray near the domain's surface may have at most.
+    fn grazing(&self, ray: &PlanRay, domain: &Aabb, delta: DVec3, least: f64) -> f64 {
+        clip(ray, &grown(domain, delta), least).map_or(0.0, |span| alpha(self.max_extinction * (span.end - span.start)))
+    }
+
+    fn inside<S: Stored>(&self, field: &Field<S>, ray: &PlanRay, span: Span) -> f64 {
+        let plan = field.plan;
+        let delta = distance(ray, span.start.abs().max(span.end.abs()));
+        let (mut bound, mut least_depth) = (0.0, 0.0);
+        for part in segments(span, plan.sampling.step_world()) {
+            let values = |x: &f64| self.values(field, plan.rays.center + ray.at(part.at(*x)), delta);
+            let nodes: Vec<Values> = plan.sampling.rule().nodes().iter().map(values).collect();
+            let (change, least) = spread(plan, &nodes, part);
+            bound += transmittance(least_depth) * change;
+            least_depth += least;
+        }
+        bound
+    }
+
+    /// The values that a node at `q` may have.
+    fn values<S: Stored>(&self, field: &Field<S>, q: DVec3, delta: DVec3) -> Values {
+        let q = field.clamped(q);
+        let own = field.index_cell(q);
+        let mut values = vec![field.in_block(own, q)];
+        self.beyond_jumps(field, own, q, delta, &mut values);
+        if !self.several_levels {
+            return values;
+        }
+        let level = field.plan.index.at(own).level();
+        let (low, high) = (field.index_cell(q - delta), field.index_cell(q + delta));
+        for cell in cells(low, high).filter(|c| field.plan.index.at(*c).level() != level) {
+            values.push(field.in_block(cell, q));
+            self.beyond_jumps(field, cell, q, delta, &mut values);
+        }
+        values
+    }
+
+    /// Adds both sides of the jumps that the value in `cell` is close to.
+    fn beyond_jumps<S: Stored>(&self, field: &Field<S>, cell: UVec3, q: DVec3, delta: DVec3, values: &mut Values) {
+        let (false, Some(at)) = (self.jumps.is_empty(), field.interpolation_cell(cell, q)) else { return };
+        let Some(value) = field.in_block(cell, q) else { return };
+        let decode = field.plan.bricks.decode();
+        let gain = (decode.scale / field.plan.bricks.format().unit()).abs();
+        let (min, max) = at.samples.iter().fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(*v), b.max(*v)));
+        let magnitude = gain * min.abs().max(max.abs()) + decode.offset.abs() + self.jumps[0].abs();
+        let reach = gain * (max - min) * delta.element_sum() + ROUNDING * magnitude;
+        for jump in self.jumps.iter().filter(|j| (value - **j).abs() <= reach) {
+            values.extend([Some(jump.next_down()), Some(*jump)]);
+        }
+    }
+}
+
+/// How far a position of the ray may be off along each axis, in voxels, for parameters up to `far`.
+fn distance(ray: &PlanRay, far: f64) -> DVec3 {
+    (ray.anchor.abs() + ray.direction.abs() * (far + ray.t_anchor.abs())) * ROUNDING
+}
+
+fn grown(b: &Aabb, delta: DVec3) -> Aabb {
+    Aabb { min: b.min - delta, max: b.max + delta }
+}
+
+fn has_several_levels(plan: &FramePlan) -> bool {
+    let mut levels = plan.index.words().iter().map(|w| IndexEntry::unpack(*w).level());
+    let first = levels.next();
+    levels.any(|l| Some(l) != first)
+}
+
+fn cells(low: UVec3, high: UVec3) -> impl Iterator<Item = UVec3> {
+    let rows = move |z| (low.y..=high.y).map(move |y| (y, z));
+    (low.z..=high.z).flat_map(rows).flat_map(move |(y, z)| (low.x..=high.x).map(move |x| UVec3::new(x, y, z)))
+}
+
+/// How far a segment's contribution may stray, and the least depth it may have.
+fn spread(plan: &FramePlan, nodes: &[Values], part: Part) -> (f64, f64) {
+    let second: &[Option<f64>] = nodes.get(1).map_or(&[None], |v| v);
+    let own = segment(plan, [nodes[0][0], second[0]], part.length());
+    let (mut change, mut least) = (0.0f64, own.depth);
+    if nodes[0].len() * second.len() == 1 {
+        return (change, least);
+    }
+    for a in &nodes[0] {
+        for b in second {
+            let other = segment(plan, [*a, *b], part.length());
+            change = change.max(difference(&own, &other));
+            least = least.min(other.depth);
+        }
+    }
+    (change, least)
+}
+
+fn difference(a: &Segment, b: &Segment) -> f64 {
+    let emission = a.emission.iter().zip(b.emission).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+    emission + (transmittance(a.depth) - transmittance(b.depth)).abs()
+}

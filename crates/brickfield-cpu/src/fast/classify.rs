@@ -1,0 +1,139 @@
+//! The transfer function in f32: extinction and colour of values relative to the first knot.
+
+use brickfield_core::{Knot, TransferFunction};
+
+/// Extinction and straight colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Optics32 {
+    pub(super) extinction: f32,
+    pub(super) color: [f32; 3],
+}
+
+/// A stretch of values in which the transfer function is linear.
+#[derive(Clone, Copy, Debug)]
+struct Stretch {
+    start: f32,
+    /// Reciprocal of the stretch's length; 0 where the function is constant.
+    reciprocal: f32,
+    low: [f32; 4],
+    high: [f32; 4],
+}
+
+/// A transfer function, ready for f32 look-up.
+///
+/// Stretch i lies between knots i - 1 and i: the first and the last reach to infinity and are constant. A table over the
+/// values says where the search for a value's stretch begins.
+#[derive(Clone, Debug)]
+pub(super) struct Classifier {
+    stretches: Vec<Stretch>,
+    /// The knots' values, and infinity.
+    ends: Vec<f32>,
+    bins: [u32; N_BINS],
+    bins_per_value: f32,
+    /// What values are relative to.
+    pub(super) origin: f64,
+}
+
+const N_BINS: usize = 256;
+
+impl Classifier {
+    pub(super) fn new(transfer: &TransferFunction) -> Classifier {
+        let knots = transfer.knots();
+        let origin = knots[0].value;
+        let relative = |k: &Knot| (k.value - origin) as f32;
+        let (first, last) = (&knots[0], &knots[knots.len() - 1]);
+        let mut stretches = vec![constant(first, relative(first))];
+        stretches.extend(knots.windows(2).map(|k| linear(&k[0], &k[1], relative(&k[0]))));
+        stretches.push(constant(last, relative(last)));
+        let mut ends: Vec<f32> = knots.iter().map(relative).collect();
+        ends.push(f32::INFINITY);
+        let extent = relative(last);
+        let bins_per_value = if extent > 0.0 { (N_BINS - 1) as f32 / extent } else { 0.0 };
+        // One bin early, so that rounding cannot begin the search too late.
+        let start = |bin: usize| (bin as f32 - 1.0) / bins_per_value;
+        let bins = std::array::from_fn(|bin| ends.partition_point(|e| *e <= start(bin)) as u32);
+        Classifier { stretches, ends, bins, bins_per_value, origin }
+    }
+
+    /// Extinction and colour at a value relative to the first knot; right-continuous at jumps.
+    #[inline(always)]
+    pub(super) fn at(&self, value: f32) -> Optics32 {
+        self.on(self.stretch(value), value)
+    }
+
+    /// The stretch that a value lies in.
+    #[inline(always)]
+    pub(super) fn stretch(&self, value: f32) -> usize {
+        let bin = (value * self.bins_per_value).clamp(0.0, (N_BINS - 1) as f32) as usize;
+        let mut i = self.bins[bin & (N_BINS - 1)] as usize;
+        while self.ends[i] <= value {
+            i += 1;
+        }
+        i
+    }
+
+    /// The linear function of stretch `i` at a value: at its ends, the limits from within.
+    #[inline(always)]
+    pub(super) fn on(&self, i: usize, value: f32) -> Optics32 {
+        let s = &self.stretches[i];
+        let f = ((value - s.start) * s.reciprocal).clamp(0.0, 1.0);
+        let mix = |c: usize| s.low[c] * (1.0 - f) + s.high[c] * f;
+        Optics32 { extinction: mix(3), color: [mix(0), mix(1), mix(2)] }
+    }
+
+    /// The value at the lower end of stretch `i`, which is not the first.
+    #[inline(always)]
+    pub(super) fn start(&self, i: usize) -> f32 {
+        self.stretches[i].start
+    }
+
+    /// The value at the upper end of stretch `i`; infinity for the last.
+    #[inline(always)]
+    pub(super) fn end(&self, i: usize) -> f32 {
+        self.ends[i]
+    }
+}
+
+fn constant(knot: &Knot, start: f32) -> Stretch {
+    Stretch { start, reciprocal: 0.0, low: rgb_extinction(knot), high: rgb_extinction(knot) }
+}
+
+fn linear(low: &Knot, high: &Knot, start: f32) -> Stretch {
+    let length = high.value - low.value;
+    let reciprocal = if length > 0.0 { (1.0 / length) as f32 } else { 0.0 };
+    let reciprocal = if reciprocal.is_finite() { reciprocal } else { 0.0 };
+    Stretch { start, reciprocal, low: rgb_extinction(low), high: rgb_extinction(high) }
+}
+
+fn rgb_extinction(k: &Knot) -> [f32; 4] {
+    [k.color[0] as f32, k.color[1] as f32, k.color[2] as f32, k.extinction as f32]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn classification_is_the_transfer_functions(
+            values in proptest::collection::vec(-100.0f64..100.0, 1..12),
+            jump in any::<bool>(),
+            at in -150.0f64..150.0,
+        ) {
+            let mut values = values;
+            values.sort_by(f64::total_cmp);
+            if jump {
+                let last = values[values.len() - 1];
+                values.push(last);
+            }
+            let knot = |(i, v): (usize, &f64)| Knot { value: *v, extinction: (i * 7 % 5) as f64, color: [0.1 * (i % 10) as f64, 0.5, 1.0] };
+            let tf = TransferFunction::new(values.iter().enumerate().map(knot).collect()).unwrap();
+            let classifier = Classifier::new(&tf);
+            let (got, expected) = (classifier.at((at - classifier.origin) as f32), tf.at(at));
+            let slope = values.windows(2).map(|v| v[1] - v[0]).filter(|d| *d > 0.0).fold(1.0, f64::min);
+            prop_assert!((f64::from(got.extinction) - expected.extinction).abs() < 1e-4 / slope);
+            prop_assert!((f64::from(got.color[0]) - expected.color[0]).abs() < 1e-4 / slope);
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! The fast f32 renderer: a backend that needs no driver.
+
+mod brick;
+mod classify;
+mod march;
+mod scalar;
+mod scene;
+mod segment;
+
+use std::time::Instant;
+
+use brickfield_core::glam::{DVec3, UVec2};
+use brickfield_core::{BrickSide, Image};
+use brickfield_frame::{
+    Backend, Capabilities, Description, Frame, FramePlan, IndexEntry, RenderError, SampleFormat, ShaderFunction, Timing,
+};
+use rayon::prelude::*;
+
+use brick::{Float32, Stored, Unorm8, Unorm16};
+use scene::Scene;
+
+/// Most pixels along a side of a picture.
+const MAX_IMAGE: u32 = 1 << 16;
+
+/// Replays plans on the CPU, in f32, over all threads of the current rayon pool.
+///
+/// Sample positions are found in f64 block by block and followed in f32 inside a block, values and optics are f32, a ray's
+/// sums f64: exact mode stays within 1e-5 of [`discrete`](crate::discrete()). Fast mode differs by early termination only.
+#[derive(Clone, Debug)]
+pub struct CpuBackend {
+    description: Description,
+}
+
+impl CpuBackend {
+    /// The backend for this machine.
+    pub fn new() -> CpuBackend {
+        CpuBackend {
+            description: Description {
+                backend: "cpu",
+                adapter: cpu_model(),
+                driver: format!("{} threads, {}", rayon::current_num_threads(), std::env::consts::ARCH),
+                capabilities: Capabilities {
+                    max_texture_3d: u32::MAX,
+                    max_image: MAX_IMAGE,
+                    max_buffer_bytes: isize::MAX as u64,
+                    sub_texel_bits: 23,
+                },
+            },
+        }
+    }
+}
+
+impl Default for CpuBackend {
+    fn default() -> Self {
+        CpuBackend::new()
+    }
+}
+
+impl Backend for CpuBackend {
+    fn describe(&self) -> &Description {
+        &self.description
+    }
+
+    fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
+        check(plan)?;
+        let begin = Instant::now();
+        let empty = plan.visible.is_empty() || plan.domain.is_empty();
+        let image = if empty { Image::transparent(plan.size()) } else { dispatch(plan, Rendering)? };
+        let wall_ms = begin.elapsed().as_secs_f64() * 1e3;
+        Ok(Frame { image, timing: Timing { wall_ms, ..Timing::default() } })
+    }
+
+    fn evaluate(
+        &mut self,
+        plan: &FramePlan,
+        function: ShaderFunction,
+        inputs: &[[f32; 4]],
+    ) -> Result<Vec<[f32; 4]>, RenderError> {
+        check(plan)?;
+        dispatch(plan, Evaluation { function, inputs })
+    }
+}
+
+/// Work on a scene of any brick side and format.
+trait Work {
+    type Output;
+    fn run<const N: usize, S: Stored>(self, scene: &Scene<N, S>) -> Self::Output;
+}
+
+fn dispatch<W: Work>(plan: &FramePlan, work: W) -> Result<W::Output, RenderError> {
+    Ok(match plan.bricks.format() {
+        SampleFormat::Unorm8 => dispatch_side::<Unorm8, W>(plan, work),
+        SampleFormat::Unorm16 => dispatch_side::<Unorm16, W>(plan, work),
+        SampleFormat::Float32 => dispatch_side::<Float32, W>(plan, work),
+    })
+}
+
+fn dispatch_side<S: Stored, W: Work>(plan: &FramePlan, work: W) -> W::Output {
+    match plan.bricks.side() {
+        BrickSide::S16 => work.run(&Scene::<16, S>::new(plan)),
+        BrickSide::S32 => work.run(&Scene::<32, S>::new(plan)),
+        BrickSide::S64 => work.run(&Scene::<64, S>::new(plan)),
+    }
+}
+
+struct Rendering;
+
+impl Work for Rendering {
+    type Output = Image<f32>;
+    fn run<const N: usize, S: Stored>(self, scene: &Scene<N, S>) -> Image<f32> {
+        let size = scene.plan.size();
+        let mut image = Image::transparent(size);
+        image.pixels_mut().par_chunks_mut(size.x.max(1) as usize).enumerate().for_each(|(y, row)| {
+            for (x, pixel) in row.iter_mut().enumerate() {
+                *pixel = march::march(scene, &scene.plan.rays.ray(x as u32, y as u32));
+            }
+        });
+        image
+    }
+}
+
+struct Evaluation<'a> {
+    function: ShaderFunction,
+    inputs: &'a [[f32; 4]],
+}
+
+impl Work for Evaluation<'_> {
+    type Output = Vec<[f32; 4]>;
+    fn run<const N: usize, S: Stored>(self, scene: &Scene<N, S>) -> Vec<[f32; 4]> {
+        self.inputs.iter().map(|input| evaluate(scene, self.function, *input)).collect()
+    }
+}
+
+fn evaluate<const N: usize, S: Stored>(
+    scene: &Scene<N, S>,
+    function: ShaderFunction,
+    [x, y, z, _]: [f32; 4],
+) -> [f32; 4] {
+    let transfer = &scene.transfer;
+    let relative = |v: f32| (f64::from(v) - transfer.origin) as f32;
+    match function {
+        ShaderFunction::Alpha => [scalar::alpha(x), 0.0, 0.0, 0.0],
+        ShaderFunction::Depth => [scalar::depth(x), 0.0, 0.0, 0.0],
+        ShaderFunction::Classify => {
+            let o = transfer.at(relative(x));
+            [o.color[0], o.color[1], o.color[2], o.extinction]
+        }
+        ShaderFunction::Segment => {
+            let rule = scene.plan.sampling.rule();
+            let s = segment::segment(rule, transfer, [Some(relative(x)), Some(relative(y))], z);
+            [s.emission[0], s.emission[1], s.emission[2], s.depth]
+        }
+        ShaderFunction::Sample => {
+            let value = scene.value(DVec3::new(x.into(), y.into(), z.into()));
+            value.map_or([0.0; 4], |v| [(f64::from(v) + transfer.origin) as f32, 1.0, 0.0, 0.0])
+        }
+        ShaderFunction::RayAnchor => {
+            let ray = scene.plan.rays.ray(x as u32, y as u32);
+            let a = ray.anchor.as_vec3();
+            [a.x, a.y, a.z, ray.t_anchor as f32]
+        }
+        ShaderFunction::RayDirection => {
+            let d = scene.plan.rays.ray(x as u32, y as u32).direction.as_vec3();
+            [d.x, d.y, d.z, 0.0]
+        }
+    }
+}
+
+/// Refuses pictures that are too large, and plans that name bricks they do not have.
+fn check(plan: &FramePlan) -> Result<(), RenderError> {
+    let size: UVec2 = plan.size();
+    if size.max_element() > MAX_IMAGE {
+        return Err(RenderError::ImageTooLarge { size, limit: MAX_IMAGE });
+    }
+    let stranger = |w: &u32| match IndexEntry::unpack(*w) {
+        IndexEntry::Resident { slot, .. } => slot >= plan.bricks.n_bricks(),
+        IndexEntry::Transparent { .. } => false,
+    };
+    if plan.index.words().iter().any(stranger) {
+        return Err(RenderError::Unsupported { what: "draw a brick that the plan does not bring" });
+    }
+    Ok(())
+}
+
+/// The processor's name, as the operating system states it.
+fn cpu_model() -> String {
+    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = info.lines().find(|l| l.starts_with("model name")).and_then(|l| l.split(':').nth(1));
+    name.map_or(std::env::consts::ARCH, str::trim).to_owned()
+}

@@ -1,0 +1,90 @@
+//! A plan, ready to be marched through: the field and the transfer function in f32.
+
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_frame::{FramePlan, IndexEntry};
+
+use super::brick::{Stored, trilinear};
+use super::classify::Classifier;
+
+/// A plan whose bricks have N samples a side, stored as `S`.
+pub(super) struct Scene<'a, const N: usize, S> {
+    pub(super) plan: &'a FramePlan,
+    pub(super) transfer: Classifier,
+    /// Adds up to a position in sample space from one relative to the frame's centre.
+    pub(super) center: DVec3,
+    pub(super) last: DVec3,
+    /// From a stored number to a value relative to the first knot.
+    pub(super) gain: f32,
+    pub(super) offset: f32,
+    stored: std::marker::PhantomData<S>,
+}
+
+/// The block of index cells that holds a position, and how far it reaches, in sample space.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Block {
+    pub(super) entry: IndexEntry,
+    /// Lower corner of the brick.
+    pub(super) corner: DVec3,
+    /// The positions that belong to the block; infinite at the volume's surface.
+    pub(super) low: DVec3,
+    pub(super) high: DVec3,
+}
+
+impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
+    pub(super) fn new(plan: &'a FramePlan) -> Self {
+        let transfer = Classifier::new(&plan.transfer);
+        let decode = plan.bricks.decode();
+        Scene {
+            plan,
+            center: plan.rays.center,
+            last: plan.last_sample(),
+            gain: (decode.scale / S::FORMAT.unit()) as f32,
+            offset: (decode.offset - transfer.origin) as f32,
+            transfer,
+            stored: std::marker::PhantomData,
+        }
+    }
+
+    /// The block that holds sample position `q`.
+    #[inline(always)]
+    pub(super) fn block(&self, q: DVec3) -> Block {
+        const { assert!(N.is_power_of_two()) }
+        let n_cells = (N - 1) as f64;
+        let dims = self.plan.index.dims();
+        // Truncation is floor: a clamped position is not negative.
+        let cell = (q.clamp(DVec3::ZERO, self.last) / n_cells).as_uvec3().min(dims - 1);
+        let entry = self.plan.index.at(cell);
+        let level = u32::from(entry.level().0);
+        let low = cell >> level << level;
+        let high = low + (1 << level);
+        let corner = low.as_dvec3() * n_cells;
+        Block {
+            entry,
+            corner,
+            low: DVec3::select(low.cmpeq(UVec3::ZERO), DVec3::NEG_INFINITY, corner),
+            high: DVec3::select(high.cmpge(dims), DVec3::INFINITY, high.as_dvec3() * n_cells),
+        }
+    }
+
+    /// The value at a sample position, relative to the first knot; `None` where its block is transparent.
+    pub(super) fn value(&self, q: DVec3) -> Option<f32> {
+        let block = self.block(q);
+        let IndexEntry::Resident { slot, level } = block.entry else { return None };
+        let s = (q.clamp(DVec3::ZERO, self.last) - block.corner) / f64::from(level.stride());
+        let s = s.clamp(DVec3::ZERO, DVec3::splat((N - 1) as f64)).as_vec3();
+        Some(self.decoded(trilinear::<N, S>(self.brick(slot), s.to_array())))
+    }
+
+    /// A stored number as a value relative to the first knot.
+    #[inline(always)]
+    pub(super) fn decoded(&self, stored: f32) -> f32 {
+        stored * self.gain + self.offset
+    }
+
+    /// The bytes of the brick in a slot.
+    #[inline(always)]
+    pub(super) fn brick(&self, slot: u32) -> &'a [u8] {
+        let n_bytes = N * N * N * S::N_BYTES;
+        &self.plan.bricks.bytes()[slot as usize * n_bytes..][..n_bytes]
+    }
+}
