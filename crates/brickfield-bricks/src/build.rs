@@ -150,8 +150,8 @@ fn fill_level<T: Sample>(
     summarise: impl Fn(BrickId, &[T]) -> BrickSummary + Sync,
 ) -> Result<TreeLevel, BuildError> {
     let n_brick = job.layout.side().n_samples_total();
+    let mut samples = zeroed::<T>(n_brick * job.layout.n_bricks_total(level), level)?;
     let ids: Vec<BrickId> = job.layout.bricks(level).collect();
-    let mut samples = zeroed::<T>(n_brick * ids.len(), level)?;
     let bricks = samples.par_chunks_exact_mut(n_brick).zip(&ids);
     let summaries = bricks.map(|(out, &id)| {
         copy_brick(source, &job.layout, id, out);
@@ -169,4 +169,15 @@ fn zeroed<T: Sample>(n: usize, level: Level) -> Result<Vec<T>, BuildError> {
     let asked = Vec::<T>::new().try_reserve_exact(n);
     asked.map_err(|_| BuildError::OutOfMemory { level, needed_bytes: n as u64 * T::TYPE.n_bytes() as u64 })?;
     Ok(vec![T::default(); n])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_that_no_machine_has_is_an_error() {
+        let error = zeroed::<u16>(isize::MAX as usize / 2, Level(3)).unwrap_err();
+        assert_eq!(error.to_string(), "the machine has no 9223372036854775806 bytes for level 3 of the bricks");
+    }
 }

@@ -32,7 +32,7 @@ pub struct TreeMemory {
 
 /// What a tree over `layout` takes, without building it.
 ///
-/// While it is built, [`build_tree`](crate::build_tree) takes up to a fifth of the volume's bytes more.
+/// While it is built, [`build_tree`](crate::build_tree) also holds two neighbouring levels, not level 0, without bricks.
 pub fn tree_memory(layout: &BrickLayout, scalar: ScalarType) -> TreeMemory {
     let levels: Vec<_> = (0..layout.n_levels()).map(|l| level_memory(layout, Level(l), scalar)).collect();
     let total = levels.iter().fold(LevelMemory::default(), |sum, level| sum.plus(level));
