@@ -1,0 +1,254 @@
+//! Named transfer functions: for Hounsfield units, and relative to a volume's range and size.
+
+use brickfield_core::{Grid, Knot, TransferError, TransferFunction, ValueRange, Volume};
+
+use crate::srgb::linear_of_hex;
+
+/// A transfer function with a name.
+///
+/// The `Ct...` presets are for Hounsfield units (air -1000, water 0) and a world in millimetres: they ignore range and
+/// size. The others are stretched over a range of values, and their extinction is so many optical depths over a length.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Preset {
+    /// Bone from 150 HU, ivory; everything softer is transparent.
+    CtBone,
+    /// Muscle and organs as a red veil, contrast-filled vessels and bone through it; fat is transparent.
+    CtSoftTissue,
+    /// Lung, airway walls and vessels; a hint of bone.
+    CtLung,
+    /// The skin as a surface.
+    CtSkin,
+    /// Magnetic resonance, whose values have no unit: the dark tenth is transparent, the bright half dense.
+    MrDefault,
+    /// White, extinction proportional to the value: the picture of a density.
+    Ramp,
+    /// From black to white, extinction proportional to the value.
+    Gray,
+    /// Viridis: perceptually uniform, from blue to yellow (Smith and van der Walt 2015, CC0).
+    Viridis,
+    /// Inferno: perceptually uniform, from black through red to light yellow (same source).
+    Inferno,
+    /// Magma: perceptually uniform, from black through purple to light yellow (same source).
+    Magma,
+    /// Plasma: perceptually uniform, from blue through red to yellow (same source).
+    Plasma,
+    /// Cool to warm: diverging from blue through grey, where it is transparent, to red (Moreland 2009).
+    CoolWarm,
+}
+
+/// Length of a volume's diagonal in world units: the length over which relative presets measure their depth.
+pub fn diagonal_world(grid: &Grid) -> f64 {
+    (grid.dims().as_dvec3() * grid.spacing()).length()
+}
+
+impl Preset {
+    /// All presets, those for Hounsfield units first.
+    pub const ALL: [Preset; 12] = [
+        Preset::CtBone,
+        Preset::CtSoftTissue,
+        Preset::CtLung,
+        Preset::CtSkin,
+        Preset::MrDefault,
+        Preset::Ramp,
+        Preset::Gray,
+        Preset::Viridis,
+        Preset::Inferno,
+        Preset::Magma,
+        Preset::Plasma,
+        Preset::CoolWarm,
+    ];
+
+    /// The preset's name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Preset::CtBone => "ct-bone",
+            Preset::CtSoftTissue => "ct-soft-tissue",
+            Preset::CtLung => "ct-lung",
+            Preset::CtSkin => "ct-skin",
+            Preset::MrDefault => "mr-default",
+            Preset::Ramp => "ramp",
+            Preset::Gray => "gray",
+            Preset::Viridis => "viridis",
+            Preset::Inferno => "inferno",
+            Preset::Magma => "magma",
+            Preset::Plasma => "plasma",
+            Preset::CoolWarm => "cool-warm",
+        }
+    }
+
+    /// The preset of that [`name`](Self::name).
+    pub fn from_name(name: &str) -> Option<Preset> {
+        Preset::ALL.into_iter().find(|p| p.name() == name)
+    }
+
+    /// What the preset's values are.
+    pub const fn scale(self) -> PresetScale {
+        match self {
+            Preset::CtBone | Preset::CtSoftTissue | Preset::CtLung | Preset::CtSkin => PresetScale::Hounsfield,
+            _ => PresetScale::Relative,
+        }
+    }
+
+    /// The transfer function for values in `range`, in a world in which the volume is `length_world` long.
+    ///
+    /// # Errors
+    /// A relative preset on a range or length that is not finite, or on a length that is 0.
+    pub fn transfer(self, range: ValueRange, length_world: f64) -> Result<TransferFunction, TransferError> {
+        let (start, span, per_depth) = match self.scale() {
+            PresetScale::Hounsfield => (0.0, 1.0, 1.0),
+            PresetScale::Relative => (range.min, range.max - range.min, 1.0 / length_world),
+        };
+        let knot = |&(at, extinction, color): &Point| Knot {
+            value: start + at * span,
+            extinction: extinction * per_depth,
+            color: linear_of_hex(color),
+        };
+        let mut knots: Vec<Knot> = self.points().iter().map(knot).collect();
+        if span == 0.0 {
+            knots.drain(..knots.len() - 1);
+        }
+        TransferFunction::new(knots)
+    }
+
+    /// The transfer function for a volume: [`transfer`](Self::transfer) over its range and diagonal.
+    ///
+    /// # Errors
+    /// A relative preset on a volume whose range or size overflows.
+    pub fn for_volume(self, volume: &Volume) -> Result<TransferFunction, TransferError> {
+        self.transfer(volume.range(), diagonal_world(volume.grid()))
+    }
+
+    fn points(self) -> &'static [Point] {
+        match self {
+            Preset::CtBone => &CT_BONE,
+            Preset::CtSoftTissue => &CT_SOFT_TISSUE,
+            Preset::CtLung => &CT_LUNG,
+            Preset::CtSkin => &CT_SKIN,
+            Preset::MrDefault => &MR_DEFAULT,
+            Preset::Ramp => &RAMP,
+            Preset::Gray => &GRAY,
+            Preset::Viridis => &VIRIDIS,
+            Preset::Inferno => &INFERNO,
+            Preset::Magma => &MAGMA,
+            Preset::Plasma => &PLASMA,
+            Preset::CoolWarm => &COOL_WARM,
+        }
+    }
+}
+
+/// What the values of a [`Preset`] are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PresetScale {
+    /// Hounsfield units; extinction per millimetre.
+    Hounsfield,
+    /// From 0 to 1 over a range of values; extinction per length of the volume.
+    Relative,
+}
+
+/// Value, extinction and sRGB colour; units as in [`PresetScale`].
+type Point = (f64, f64, u32);
+
+/// Optical depth of the brightest value over the volume's diagonal.
+const FULL: f64 = 60.0;
+
+const CT_BONE: [Point; 5] = [
+    (150.0, 0.0, 0x5a1e14),
+    (280.0, 0.03, 0xa8603c),
+    (600.0, 0.35, 0xe8cfa0),
+    (1200.0, 1.0, 0xfff8ea),
+    (3000.0, 1.5, 0xffffff),
+];
+const CT_SOFT_TISSUE: [Point; 6] = [
+    (-10.0, 0.0, 0x4a1010),
+    (30.0, 0.012, 0x9a3a28),
+    (80.0, 0.03, 0xc05038),
+    (160.0, 0.15, 0xe88860),
+    (300.0, 0.35, 0xf4d8b0),
+    (1200.0, 1.0, 0xfffaf0),
+];
+const CT_LUNG: [Point; 7] = [
+    (-970.0, 0.0, 0x102848),
+    (-880.0, 0.003, 0x3c78a8),
+    (-700.0, 0.012, 0x78b0d8),
+    (-450.0, 0.12, 0xf0b090),
+    (-200.0, 0.0, 0xe07860),
+    (250.0, 0.0, 0xd8c8a8),
+    (900.0, 0.04, 0xfff8ea),
+];
+const CT_SKIN: [Point; 4] =
+    [(-450.0, 0.0, 0x502818), (-250.0, 0.15, 0xb07858), (0.0, 0.8, 0xe8b898), (300.0, 1.5, 0xf8e0cc)];
+const MR_DEFAULT: [Point; 5] =
+    [(0.1, 0.0, 0x301c18), (0.25, 1.5, 0x80483c), (0.5, 12.0, 0xc88c70), (0.75, 40.0, 0xf0d8c0), (1.0, 80.0, 0xffffff)];
+const RAMP: [Point; 2] = [(0.02, 0.0, 0xffffff), (1.0, FULL, 0xffffff)];
+const GRAY: [Point; 2] = [(0.02, 0.0, 0x000000), (1.0, FULL, 0xffffff)];
+
+/// Nine equidistant colours of a map, the first transparent, extinction rising with the square of the value: what is
+/// rare and high shows through what is common and low.
+const fn rising(colors: [u32; 9]) -> [Point; 9] {
+    let mut points = [(0.0, 0.0, 0); 9];
+    let mut i = 0;
+    while i < 9 {
+        let x = i as f64 / 8.0;
+        points[i] = (if i == 0 { 0.02 } else { x }, FULL * x * x, colors[i]);
+        i += 1;
+    }
+    points
+}
+
+const VIRIDIS: [Point; 9] =
+    rising([0x440154, 0x472d7b, 0x3b528b, 0x2c728e, 0x21918c, 0x27ad81, 0x5cc863, 0xaadc32, 0xfde725]);
+const INFERNO: [Point; 9] =
+    rising([0x000004, 0x210c4a, 0x57106e, 0x8a226a, 0xbc3754, 0xe35933, 0xf98c0a, 0xf9c932, 0xfcffa4]);
+const MAGMA: [Point; 9] =
+    rising([0x000004, 0x1d1147, 0x51127c, 0x832681, 0xb73779, 0xe55064, 0xfb8761, 0xfec287, 0xfcfdbf]);
+const PLASMA: [Point; 9] =
+    rising([0x0d0887, 0x4c02a1, 0x7e03a8, 0xaa2395, 0xcc4778, 0xe56b5d, 0xf89441, 0xfdc328, 0xf0f921]);
+const COOL_WARM: [Point; 4] =
+    [(0.0, FULL, 0x3b4cc0), (0.48, 0.0, 0xdddddd), (0.52, 0.0, 0xdddddd), (1.0, FULL, 0xb40426)];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RANGE: ValueRange = ValueRange { min: -20.0, max: 80.0 };
+
+    #[test]
+    fn names_are_unique_and_found() {
+        for preset in Preset::ALL {
+            assert_eq!(Preset::from_name(preset.name()), Some(preset));
+        }
+        assert_eq!(Preset::from_name("bone"), None);
+    }
+
+    #[test]
+    fn every_preset_has_something_transparent_and_something_dense() {
+        for preset in Preset::ALL {
+            let tf = preset.transfer(RANGE, 100.0).unwrap();
+            let least = tf.knots().iter().map(|k| k.extinction).fold(f64::INFINITY, f64::min);
+            assert_eq!(least, 0.0, "{}", preset.name());
+            assert!(tf.max_extinction(ValueRange { min: -5e3, max: 5e3 }) > 0.1, "{}", preset.name());
+        }
+    }
+
+    #[test]
+    fn air_is_transparent_in_hounsfield_presets() {
+        for preset in Preset::ALL.into_iter().filter(|p| p.scale() == PresetScale::Hounsfield) {
+            let tf = preset.transfer(RANGE, f64::NAN).unwrap();
+            assert!(tf.is_transparent(ValueRange { min: -5000.0, max: -970.0 }), "{}", preset.name());
+        }
+    }
+
+    #[test]
+    fn relative_presets_follow_range_and_length() {
+        let tf = Preset::Ramp.transfer(RANGE, 30.0).unwrap();
+        assert_eq!((tf.at(80.0).extinction, tf.at(-18.0).extinction), (2.0, 0.0));
+        assert!(Preset::Ramp.transfer(RANGE, 0.0).is_err());
+        assert!(Preset::Gray.transfer(ValueRange { min: f64::MIN, max: f64::MAX }, 1.0).is_err());
+    }
+
+    #[test]
+    fn a_constant_range_gets_the_brightest_knot() {
+        let tf = Preset::Viridis.transfer(ValueRange { min: 5.0, max: 5.0 }, 1.0).unwrap();
+        assert_eq!((tf.knots().len(), tf.at(5.0).extinction), (1, FULL));
+    }
+}
