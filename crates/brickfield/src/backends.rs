@@ -90,3 +90,63 @@ impl std::str::FromStr for BackendKind {
 pub fn backends() -> Vec<BackendStatus> {
     BackendKind::ALL.map(|kind| BackendStatus { kind, adapters: adapters(kind) }).to_vec()
 }
+
+/// Opens a backend on an adapter: its number, a part of its name, or the backend's choice.
+///
+/// # Errors
+/// A backend that is not in this build, not on this machine, or has no such adapter.
+pub fn open_backend(
+    kind: BackendKind,
+    adapter: Option<&str>,
+    validation: Validation,
+) -> Result<Box<dyn Backend>, BackendError> {
+    match kind {
+        BackendKind::Cpu => open_cpu(adapter),
+        BackendKind::Wgpu => open_wgpu(adapter, validation),
+        BackendKind::Ash => open_ash(adapter, validation),
+    }
+}
+
+fn adapters(kind: BackendKind) -> Result<Vec<AdapterInfo>, String> {
+    match kind {
+        BackendKind::Cpu => {
+            let backend = CpuBackend::new();
+            let d = backend.describe();
+            Ok(vec![AdapterInfo { index: 0, name: d.adapter.clone(), driver: d.driver.clone() }])
+        }
+        BackendKind::Wgpu => wgpu_adapters(),
+        BackendKind::Ash => ash_adapters(),
+    }
+}
+
+fn open_cpu(adapter: Option<&str>) -> Result<Box<dyn Backend>, BackendError> {
+    let backend = CpuBackend::new();
+    let name = &backend.describe().adapter;
+    match adapter {
+        Some(wanted) if wanted != "0" && !name.contains(wanted) => {
+            let reason = format!("no adapter {wanted:?}; there is 0: {name}");
+            Err(BackendError::Unavailable { kind: BackendKind::Cpu, reason })
+        }
+        _ => Ok(Box::new(backend)),
+    }
+}
+
+#[cfg(not(feature = "wgpu"))]
+fn wgpu_adapters() -> Result<Vec<AdapterInfo>, String> {
+    Err(BackendError::NotBuilt { kind: BackendKind::Wgpu }.to_string())
+}
+
+#[cfg(not(feature = "wgpu"))]
+fn open_wgpu(_: Option<&str>, _: Validation) -> Result<Box<dyn Backend>, BackendError> {
+    Err(BackendError::NotBuilt { kind: BackendKind::Wgpu })
+}
+
+#[cfg(not(feature = "ash"))]
+fn ash_adapters() -> Result<Vec<AdapterInfo>, String> {
+    Err(BackendError::NotBuilt { kind: BackendKind::Ash }.to_string())
+}
+
+#[cfg(not(feature = "ash"))]
+fn open_ash(_: Option<&str>, _: Validation) -> Result<Box<dyn Backend>, BackendError> {
+    Err(BackendError::NotBuilt { kind: BackendKind::Ash })
+}

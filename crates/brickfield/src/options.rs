@@ -102,6 +102,8 @@ pub enum OptionError {
     #[error(transparent)]
     Build(#[from] brickfield_bricks::BuildError),
     #[error("--transfer: {0}")]
+    Preset(#[from] brickfield_core::TransferError),
+    #[error("--transfer: {0}")]
     Transfer(#[from] brickfield_optics::TransferFileError),
     #[error("--transfer {name:?} is neither auto, nor a file, nor a preset; the presets are {presets}")]
     NoSuchTransfer { name: String, presets: String },
@@ -153,7 +155,7 @@ impl ViewOptions {
             return Ok(brickfield_optics::automatic(volume));
         }
         if let Some(preset) = brickfield_optics::Preset::from_name(&self.transfer) {
-            return Ok(preset.transfer(volume));
+            return Ok(preset.for_volume(volume)?);
         }
         let path = PathBuf::from(&self.transfer);
         if path.exists() {
