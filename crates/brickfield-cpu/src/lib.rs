@@ -1,7 +1,10 @@
 #![doc = include_str!("../README.md")]
 
+pub mod closed_form;
+mod continuous;
 mod discrete;
 mod fast;
 
+pub use continuous::{Continuous, ContinuousOptions, RayIntegral, continuous, continuous_ray};
 pub use discrete::{Discrete, discrete};
 pub use fast::CpuBackend;

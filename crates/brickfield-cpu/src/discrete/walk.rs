@@ -42,10 +42,8 @@ pub(super) fn clip(ray: &PlanRay, b: &Aabb, least: f64) -> Option<Span> {
 /// The segments [k h, (k + 1) h), cut to `span`.
 pub(super) fn segments(span: Span, step: f64) -> impl Iterator<Item = Part> {
     let (first, end) = ((span.start / step).floor() as i64, (span.end / step).ceil() as i64);
-    let part = move |k: i64| Part {
-        start: (k as f64 * step).max(span.start),
-        end: ((k + 1) as f64 * step).min(span.end),
-    };
+    let part =
+        move |k: i64| Part { start: (k as f64 * step).max(span.start), end: ((k + 1) as f64 * step).min(span.end) };
     (first..end).map(part).filter(|p| p.start < p.end)
 }
 

@@ -10,7 +10,10 @@ pub(super) trait Stored: Copy + Send + Sync + 'static {
     const N_BYTES: usize;
     /// The format.
     const FORMAT: SampleFormat;
-    /// The stored number at the start of `bytes`.
+    /// Taken off stored numbers before they are interpolated: 16 bits leave f32 only 8 bits for fractions, so numbers are
+    /// counted from the one that stands for the transfer function's first knot.
+    const IS_WIDE: bool = false;
+    /// The stored number of sample `i`.
     fn read(bytes: &[u8], i: usize) -> f32;
 }
 
