@@ -10,6 +10,7 @@ mod uniform;
 
 pub use backend::{Backend, Capabilities, Description, Frame, RenderError, ShaderFunction, Timing};
 pub use brick_set::{AtlasShape, BrickSet, BrickSetError, Decode, SampleFormat};
+pub use brickfield_optics::QuadratureRule;
 pub use feature::{Feature, FeatureSet};
 pub use index::{IndexEntry, IndexGrid};
 pub use plan::{FramePlan, Mode, Sampling, SamplingError};

@@ -1,1 +1,16 @@
 #![doc = include_str!("../README.md")]
+
+mod evaluate;
+mod library;
+mod reflect;
+mod specialise;
+mod variant;
+
+pub use evaluate::{shader_inputs, shader_outputs};
+pub use library::{PatchError, ShaderLibrary};
+pub use reflect::{Binding, BindingKind};
+pub use specialise::{Counts, ShaderError, Specialised, specialise};
+pub use variant::{Entry, Variant};
+
+/// The compiler that the modules are for.
+pub use naga;

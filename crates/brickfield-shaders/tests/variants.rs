@@ -1,0 +1,84 @@
+//! Every variant compiles, and holds nothing that it does not need.
+
+use brickfield_frame::{Feature, FeatureSet, QuadratureRule, ShaderFunction};
+use brickfield_shaders::{BindingKind, Entry, Specialised, Variant, specialise};
+
+fn feature_sets() -> impl Iterator<Item = FeatureSet> {
+    (0..1u32 << Feature::ALL.len())
+        .map(|bits| Feature::ALL.into_iter().filter(|f| bits >> *f as u32 & 1 == 1).collect())
+}
+
+fn march(features: FeatureSet, rule: QuadratureRule) -> Specialised {
+    specialise(&Variant { features, rule, entry: Entry::March })
+        .unwrap_or_else(|e| panic!("{features:?} {rule:?}: {e}"))
+}
+
+fn indices(shader: &Specialised) -> Vec<u32> {
+    shader.bindings.iter().map(|b| b.index).collect()
+}
+
+#[test]
+fn every_variant_of_the_march_compiles() {
+    for features in feature_sets() {
+        for rule in QuadratureRule::ALL {
+            let shader = march(features, rule);
+            assert!(shader.spirv().unwrap().len() > 100);
+            assert_eq!(shader.workgroup_size, [8, 8, 1]);
+        }
+    }
+}
+
+#[test]
+fn every_variant_of_every_function_compiles() {
+    for features in feature_sets() {
+        for rule in QuadratureRule::ALL {
+            for function in ShaderFunction::ALL {
+                let variant = Variant { features, rule, entry: Entry::Evaluate(function) };
+                let shader = specialise(&variant).unwrap_or_else(|e| panic!("{variant:?}: {e}"));
+                assert!(shader.bindings.iter().any(|b| b.index == 7 && b.kind == BindingKind::StorageReadWrite));
+            }
+        }
+    }
+}
+
+#[test]
+fn what_a_scene_does_not_need_is_left_out() {
+    let rule = QuadratureRule::MidpointExponential;
+    let all = FeatureSet::all();
+    assert_eq!(indices(&march(all, rule)), [0, 1, 2, 3, 4, 5]);
+    assert_eq!(indices(&march(all.without(Feature::HardwareFilter), rule)), [0, 1, 3, 4, 5]);
+    assert_eq!(indices(&march(FeatureSet::default(), rule)), [0, 4, 5]);
+    assert_eq!(indices(&march(FeatureSet::default().with(Feature::SkipTransparent), rule)), [0, 3, 4, 5]);
+
+    let general = march(all, rule);
+    for feature in Feature::ALL.into_iter().filter(|f| *f != Feature::HardwareFilter) {
+        let without = march(all.without(feature), rule);
+        assert!(without.counts.expressions < general.counts.expressions, "{}", feature.name());
+        assert!(without.spirv().unwrap().len() < general.spirv().unwrap().len(), "{}", feature.name());
+    }
+    let least = march(FeatureSet::default(), rule);
+    assert!(least.counts.functions < general.counts.functions);
+    for (text, feature) in [
+        ("textureSampleLevel", Feature::HardwareFilter),
+        ("fn ended", Feature::EarlyTermination),
+        ("resident", Feature::SkipTransparent),
+        ("scale", Feature::MultiLevel),
+        ("fn knot_below", Feature::TransferLookup),
+    ] {
+        assert!(general.wgsl.contains(text) && !march(all.without(feature), rule).wgsl.contains(text), "{text}");
+    }
+    assert!(!general.wgsl.contains("textureLoad") && !general.wgsl.contains("preintegrate"));
+}
+
+#[test]
+fn functions_bind_what_they_read() {
+    let bindings = |function| {
+        let rule = QuadratureRule::Gauss2;
+        let features = FeatureSet::default().with(Feature::TransferLookup);
+        indices(&specialise(&Variant { features, rule, entry: Entry::Evaluate(function) }).unwrap())
+    };
+    assert_eq!(bindings(ShaderFunction::Alpha), [6, 7]);
+    assert_eq!(bindings(ShaderFunction::Classify), [0, 4, 6, 7]);
+    assert_eq!(bindings(ShaderFunction::Sample), [0, 1, 3, 6, 7]);
+    assert_eq!(bindings(ShaderFunction::RayAnchor), [0, 6, 7]);
+}
