@@ -3,10 +3,14 @@
 #[cfg(feature = "gzip")]
 mod deflate;
 mod detached;
+#[cfg(feature = "dicom")]
+pub mod dicom;
 mod error;
 mod file_list;
 mod files;
 mod format;
+#[cfg(any(feature = "dicom", feature = "ome-zarr", feature = "tiff"))]
+mod guard;
 mod limits;
 mod lines;
 pub mod metaimage;
@@ -14,15 +18,19 @@ pub mod metaimage;
 pub mod nifti;
 mod note;
 pub mod nrrd;
+#[cfg(feature = "ome-zarr")]
+pub mod ome_zarr;
 mod open;
 mod opened;
 mod placement;
 pub mod raw;
-#[cfg(feature = "nifti")]
+#[cfg(any(feature = "nifti", feature = "dicom"))]
 mod rescale;
 mod samples;
 mod save;
 mod stored;
+#[cfg(feature = "tiff")]
+pub mod tiff;
 #[cfg(feature = "vti")]
 pub mod vti;
 

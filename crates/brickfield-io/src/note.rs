@@ -32,6 +32,8 @@ pub enum Note {
     DuplicateSlices { n_slices: usize },
     /// Files of a folder that are not slices.
     FilesSkipped { n_files: usize, first: String, reason: String },
+    /// Pages of a TIFF that are reduced copies of others.
+    PagesSkipped { n_pages: usize },
     /// The data go on after the last voxel that the header promises.
     SurplusData,
     /// MONOCHROME1: the file wants low values shown bright. Values are as in the file.
@@ -73,6 +75,7 @@ impl fmt::Display for Note {
             Note::FilesSkipped { n_files, first, reason } => {
                 write!(f, "{n_files} files are no slices and were skipped, first {first:?}: {reason}")
             }
+            Note::PagesSkipped { n_pages } => write!(f, "{n_pages} pages of reduced resolution were skipped"),
             Note::SurplusData => f.write_str("the data go on after the last voxel that the header promises"),
             Note::LowIsBright => {
                 f.write_str("the file wants low values shown bright (MONOCHROME1); values are as stored")

@@ -120,9 +120,9 @@ fn open_file(path: &Path, format: Format, limits: &Limits) -> Result<Opened, Rea
         Format::Nifti => crate::nifti::read(file, &stem(path), &folder, limits),
         #[cfg(feature = "vti")]
         Format::Vti => crate::vti::read(file, limits),
-        #[cfg(any())] //dicom
+        #[cfg(feature = "dicom")]
         Format::Dicom => crate::dicom::read(&[file_name(path)], &folder, limits),
-        #[cfg(any())] //tiff
+        #[cfg(feature = "tiff")]
         Format::Tiff => crate::tiff::read(file, limits),
         Format::Raw => Err(ReadError::Missing { field: "the shape of a raw file (dims and type; see open_raw)" }),
         Format::OmeZarr => Err(ReadError::UnknownFormat { found: Shown::of_bytes(&read_head(&mut file, 16)?) }),
@@ -133,12 +133,12 @@ fn open_file(path: &Path, format: Format, limits: &Limits) -> Result<Opened, Rea
 
 fn open_folder(path: &Path, format: Format, limits: &Limits) -> Result<Opened, ReadError> {
     match format {
-        #[cfg(any())] //dicom
+        #[cfg(feature = "dicom")]
         Format::Dicom => {
             let names = file_names(path).map_err(|e| ReadError::io("the folder", e))?;
             crate::dicom::read(&names, &Folder(path.to_owned()), limits)
         }
-        #[cfg(any())] //ome-zarr
+        #[cfg(feature = "ome-zarr")]
         Format::OmeZarr => crate::ome_zarr::read(path, limits),
         _ => Err(feature_off(format)),
     }
@@ -156,7 +156,7 @@ fn feature_off(format: Format) -> ReadError {
     ReadError::FeatureOff { format, feature }
 }
 
-#[cfg(any())] //dicom
+#[cfg(feature = "dicom")]
 fn file_name(path: &Path) -> String {
     path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }
@@ -170,7 +170,7 @@ fn stem(path: &Path) -> String {
 }
 
 /// Names of the regular files in a folder, in order.
-#[cfg(any())] //dicom
+#[cfg(feature = "dicom")]
 fn file_names(folder: &Path) -> io::Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in folder.read_dir()? {

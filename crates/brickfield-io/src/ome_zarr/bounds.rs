@@ -1,0 +1,165 @@
+//! How chunks are packed, and proof that a stored chunk unpacks to its claimed size, before `zarrs` unpacks it.
+//!
+//! The decoders of `zarrs` read gzip and zstd to their end, however long that is.
+
+use std::io::{self, Read};
+
+use serde_json::Value;
+
+use super::metadata::numbers;
+use crate::ReadError;
+
+/// What compresses the bytes of a chunk, or of the parts of a shard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Compressor {
+    None,
+    Gzip,
+    Zlib,
+    Zstd,
+    Blosc,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Packing {
+    Plain(Compressor),
+    Shard(Shard),
+}
+
+/// A shard: chunks in a chunk, found by an index of offset and length at one end.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Shard {
+    part_shape: Vec<u64>,
+    compressor: Compressor,
+    is_index_first: bool,
+    index_has_checksum: bool,
+}
+
+impl Compressor {
+    fn named(name: &str) -> Result<Compressor, ReadError> {
+        match name {
+            "gzip" => Ok(Compressor::Gzip),
+            "zlib" | "numcodecs.zlib" => Ok(Compressor::Zlib),
+            "zstd" | "numcodecs.zstd" => Ok(Compressor::Zstd),
+            "blosc" | "numcodecs.blosc" => Ok(Compressor::Blosc),
+            _ => Err(ReadError::unsupported("compressor", name, "gzip, zlib, zstd and blosc are")),
+        }
+    }
+}
+
+impl Packing {
+    pub(super) fn of_v2(compressor: &Value) -> Result<Packing, ReadError> {
+        match compressor {
+            Value::Null => Ok(Packing::Plain(Compressor::None)),
+            other => Ok(Packing::Plain(Compressor::named(other["id"].as_str().unwrap_or_default())?)),
+        }
+    }
+
+    pub(super) fn of_v3(codecs: &Value) -> Result<Packing, ReadError> {
+        let first = codecs.as_array().and_then(|list| list.first());
+        let Some(shard) = first.filter(|codec| codec["name"] == "sharding_indexed") else {
+            return Ok(Packing::Plain(compressor_of(codecs)?));
+        };
+        let configuration = &shard["configuration"];
+        let index_codecs = configuration["index_codecs"].as_array().into_iter().flatten();
+        Ok(Packing::Shard(Shard {
+            part_shape: numbers(configuration, "chunk_shape")?,
+            compressor: compressor_of(&configuration["codecs"])?,
+            is_index_first: configuration["index_location"] == "start",
+            index_has_checksum: index_codecs.clone().any(|codec| codec["name"] == "crc32c"),
+        }))
+    }
+
+    /// Checks that the stored bytes unpack to no more than the chunk has.
+    pub(super) fn check(
+        &self,
+        stored: &[u8],
+        chunk_shape: &[u64],
+        sample_bytes: u64,
+        what: &str,
+    ) -> Result<(), ReadError> {
+        let n_bytes = |shape: &[u64]| shape.iter().fold(sample_bytes, |n, s| n.saturating_mul(*s));
+        match self {
+            Packing::Plain(compressor) => check_stream(*compressor, stored, n_bytes(chunk_shape), what),
+            Packing::Shard(shard) => {
+                for part in shard.parts(stored, chunk_shape, what)? {
+                    check_stream(shard.compressor, part, n_bytes(&shard.part_shape), what)?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// The one compressor among codecs that change no lengths.
+fn compressor_of(codecs: &Value) -> Result<Compressor, ReadError> {
+    let mut found = Compressor::None;
+    for codec in codecs.as_array().into_iter().flatten() {
+        let name = codec["name"].as_str().unwrap_or_default();
+        if matches!(name, "bytes" | "endian" | "transpose" | "crc32c") {
+            continue;
+        }
+        if found != Compressor::None {
+            return Err(ReadError::unsupported("second compressor", name, "one is"));
+        }
+        found = Compressor::named(name)?;
+    }
+    Ok(found)
+}
+
+impl Shard {
+    /// The stored bytes of each part that is there.
+    fn parts<'a>(&self, stored: &'a [u8], chunk_shape: &[u64], what: &str) -> Result<Vec<&'a [u8]>, ReadError> {
+        let bad = |field: &str, value: String, expected: String| ReadError::field(format!("{field} of {what}"), value, expected);
+        let fits = self.part_shape.len() == chunk_shape.len() && !self.part_shape.contains(&0);
+        if !fits {
+            let value = format!("{:?}", self.part_shape);
+            return Err(bad("part shape", value, format!("a divisor of {chunk_shape:?}")));
+        }
+        let per_axis = chunk_shape.iter().zip(&self.part_shape).map(|(n, part)| u128::from(n.div_ceil(*part)));
+        let n_parts = per_axis.fold(1u128, |n, m| n.saturating_mul(m));
+        let checksum_bytes = if self.index_has_checksum { 4 } else { 0 };
+        let index_bytes = n_parts.saturating_mul(16).saturating_add(checksum_bytes);
+        if index_bytes > stored.len() as u128 {
+            return Err(bad("index length", index_bytes.to_string(), format!("at most the {} bytes stored", stored.len())));
+        }
+        let start = if self.is_index_first { 0 } else { stored.len() - index_bytes as usize };
+        let index = &stored[start..start + (n_parts * 16) as usize];
+        let word = |bytes: &[u8]| bytes.iter().rev().fold(0u64, |n, b| n << 8 | u64::from(*b));
+        let mut parts = Vec::new();
+        for entry in index.chunks_exact(16) {
+            let (offset, n_bytes) = (word(&entry[..8]), word(&entry[8..]));
+            if (offset, n_bytes) == (u64::MAX, u64::MAX) {
+                continue;
+            }
+            let end = offset.checked_add(n_bytes).filter(|end| *end <= stored.len() as u64);
+            let end = end.ok_or_else(|| bad("index entry", format!("{offset} + {n_bytes}"), format!("within {} bytes", stored.len())))?;
+            parts.push(&stored[offset as usize..end as usize]);
+        }
+        Ok(parts)
+    }
+}
+
+fn check_stream(compressor: Compressor, stored: &[u8], max_bytes: u64, what: &str) -> Result<(), ReadError> {
+    let unpacked = match compressor {
+        Compressor::None => return Ok(()),
+        Compressor::Gzip => n_unpacked(flate2::read::GzDecoder::new(stored), max_bytes),
+        Compressor::Zlib => n_unpacked(flate2::read::ZlibDecoder::new(stored), max_bytes),
+        Compressor::Zstd => zstd::Decoder::with_buffer(stored).and_then(|d| n_unpacked(d, max_bytes)),
+        Compressor::Blosc => Ok(blosc_bytes(stored)),
+    };
+    let n_bytes = unpacked.map_err(|e| ReadError::io(what, e))?;
+    if n_bytes > max_bytes {
+        return Err(ReadError::TooLarge { what: format!("{what}, unpacked,"), n_bytes: u128::from(n_bytes), max_bytes });
+    }
+    Ok(())
+}
+
+/// Bytes that come out, counted up to one more than allowed and not kept.
+fn n_unpacked(unpacked: impl Read, max_bytes: u64) -> io::Result<u64> {
+    io::copy(&mut unpacked.take(max_bytes.saturating_add(1)), &mut io::sink())
+}
+
+/// What the header of a blosc buffer claims; the decoder allocates and checks by it.
+fn blosc_bytes(stored: &[u8]) -> u64 {
+    stored.get(4..8).and_then(|b| b.try_into().ok()).map_or(0, |b| u64::from(u32::from_le_bytes(b)))
+}

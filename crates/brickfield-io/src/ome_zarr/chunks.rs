@@ -1,0 +1,132 @@
+//! From chunks to voxels.
+
+use brickfield_core::{Scalar, ScalarType, Voxels};
+use zarrs::array::{Array, ElementOwned};
+use zarrs::storage::{ReadableStorage, ReadableStorageTraits};
+
+use super::image::VolumeAxes;
+use super::metadata::ArrayMetadata;
+use crate::ReadError;
+use crate::limits::Shape;
+use crate::samples::Sample;
+
+/// Reads all chunks that hold the first entry of every other axis.
+pub(super) fn read(
+    store: &ReadableStorage,
+    path: &str,
+    metadata: &ArrayMetadata,
+    volume_axes: VolumeAxes,
+    shape: &Shape,
+) -> Result<Voxels, ReadError> {
+    let array = Array::new_with_metadata(store.clone(), path, metadata.for_zarrs()?);
+    let array = array.map_err(|e| ReadError::decoder("the array", e))?;
+    let reader = Reader { array, metadata, volume_axes, dims: shape.dims.to_array().map(u64::from) };
+    match metadata.scalar {
+        ScalarType::U8 => reader.read::<u8>(),
+        ScalarType::I8 => reader.read::<i8>(),
+        ScalarType::U16 => reader.read::<u16>(),
+        ScalarType::I16 => reader.read::<i16>(),
+        ScalarType::U32 => reader.read::<u32>(),
+        ScalarType::I32 => reader.read::<i32>(),
+        ScalarType::F32 => reader.read::<f32>(),
+        ScalarType::F64 => reader.read::<f64>(),
+    }
+}
+
+struct Reader<'a> {
+    array: Array<dyn ReadableStorageTraits>,
+    metadata: &'a ArrayMetadata,
+    volume_axes: VolumeAxes,
+    dims: [u64; 3],
+}
+
+impl Reader<'_> {
+    fn read<T: Sample + ElementOwned>(&self) -> Result<Voxels, ReadError> {
+        let fill = self.fill_value::<T>()?;
+        let n = self.dims.iter().product::<u64>() as usize;
+        let mut values = Vec::<T>::new();
+        let n_bytes = n as u128 * size_of::<T>() as u128;
+        values.try_reserve_exact(n).map_err(|_| ReadError::OutOfMemory { n_bytes })?;
+        values.resize(n, fill);
+        let chunk = self.along_volume(&self.metadata.chunk_shape);
+        let n_chunks = [0, 1, 2].map(|i| self.dims[i].div_ceil(chunk[i]));
+        for z in 0..n_chunks[2] {
+            for y in 0..n_chunks[1] {
+                for x in 0..n_chunks[0] {
+                    self.read_chunk([x, y, z], chunk, &mut values)?;
+                }
+            }
+        }
+        Ok(Scalar::wrap(values))
+    }
+
+    fn fill_value<T: Sample>(&self) -> Result<T, ReadError> {
+        let bytes = self.array.fill_value().as_ne_bytes();
+        let native = if cfg!(target_endian = "big") { crate::ByteOrder::Big } else { crate::ByteOrder::Little };
+        let mut values = Vec::new();
+        T::append(bytes, native, &mut values);
+        values.first().copied().ok_or_else(|| ReadError::field("fill_value", format!("{bytes:?}"), T::TYPE.name()))
+    }
+
+    /// Sizes along x, y, z; 1 where the array has no such axis.
+    fn along_volume(&self, sizes: &[u64]) -> [u64; 3] {
+        self.volume_axes.map(|axis| axis.map_or(1, |a| sizes[a]))
+    }
+
+    fn read_chunk<T: Sample + ElementOwned>(
+        &self,
+        at: [u64; 3],
+        chunk: [u64; 3],
+        values: &mut [T],
+    ) -> Result<(), ReadError> {
+        let mut indices = vec![0; self.metadata.shape.len()];
+        for (axis, i) in self.volume_axes.iter().zip(at) {
+            if let Some(axis) = axis {
+                indices[*axis] = i;
+            }
+        }
+        let what = format!("chunk {indices:?}");
+        let fault = |e: Box<dyn std::error::Error + Send + Sync>| ReadError::decoder(&what, e);
+        let stored = self.array.retrieve_encoded_chunk(&indices).map_err(|e| fault(e.into()))?;
+        let Some(stored) = stored else { return Ok(()) };
+        let (chunk_shape, sample_bytes) = (&self.metadata.chunk_shape, size_of::<T>() as u64);
+        self.metadata.packing.check(&stored, chunk_shape, sample_bytes, &what)?;
+        drop(stored);
+        let samples: Vec<T> = self.array.retrieve_chunk(&indices).map_err(|e| fault(e.into()))?;
+        let n_expected = self.metadata.chunk_shape.iter().product::<u64>() as usize;
+        if samples.len() != n_expected {
+            return Err(ReadError::TooFewSamples { what, found: samples.len(), expected: n_expected });
+        }
+        self.place(&samples, [0, 1, 2].map(|i| at[i] * chunk[i]), chunk, values);
+        Ok(())
+    }
+
+    /// Copies the part of a chunk that lies in the volume; `start` is its first voxel.
+    fn place<T: Copy>(&self, samples: &[T], start: [u64; 3], chunk: [u64; 3], values: &mut [T]) {
+        let strides = self.along_volume(&strides(&self.metadata.chunk_shape));
+        let [nx, ny, nz] = [0, 1, 2].map(|i| chunk[i].min(self.dims[i] - start[i]));
+        for z in 0..nz {
+            for y in 0..ny {
+                let from = (z * strides[2] + y * strides[1]) as usize;
+                let row = ((start[2] + z) * self.dims[1] + start[1] + y) * self.dims[0] + start[0];
+                let out = &mut values[row as usize..(row + nx) as usize];
+                match strides[0] {
+                    1 => out.copy_from_slice(&samples[from..from + nx as usize]),
+                    stride => {
+                        let column = samples[from..].iter().step_by(stride as usize);
+                        out.iter_mut().zip(column).for_each(|(o, s)| *o = *s);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Samples from one entry to the next along each axis, the last being fastest.
+fn strides(shape: &[u64]) -> Vec<u64> {
+    let mut strides = vec![1; shape.len()];
+    for axis in (1..shape.len()).rev() {
+        strides[axis - 1] = strides[axis] * shape[axis];
+    }
+    strides
+}

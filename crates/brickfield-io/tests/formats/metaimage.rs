@@ -1,0 +1,96 @@
+use std::io::Cursor;
+
+use brickfield_core::ScalarType;
+use brickfield_core::glam::DVec3;
+use brickfield_io::{ByteOrder, DataFiles, NoFiles, Note, Opened, ReadError, WorldFrame, metaimage};
+
+use crate::common::*;
+
+fn read(header: &str, data: &[u8], files: &dyn DataFiles) -> Result<Opened, ReadError> {
+    metaimage::read(Cursor::new([header.as_bytes(), data].concat()), files, &LIMITS)
+}
+
+fn header(element: &str, more: &str, data_file: &str) -> String {
+    format!(
+        "ObjectType = Image\nNDims = 3\n{more}\nDimSize = 4 3 2\nElementType = {element}\nElementDataFile = {data_file}\n"
+    )
+}
+
+fn element(scalar: ScalarType) -> &'static str {
+    match scalar {
+        ScalarType::U8 => "MET_UCHAR",
+        ScalarType::I8 => "MET_CHAR",
+        ScalarType::U16 => "MET_USHORT",
+        ScalarType::I16 => "MET_SHORT",
+        ScalarType::U32 => "MET_UINT",
+        ScalarType::I32 => "MET_LONG",
+        ScalarType::F32 => "MET_FLOAT",
+        ScalarType::F64 => "MET_DOUBLE",
+    }
+}
+
+#[test]
+fn every_type_order_and_encoding() {
+    for scalar in ScalarType::ALL {
+        let ramp = ramp(scalar);
+        let plain = header(element(scalar), "BinaryData = False", "LOCAL");
+        assert_ramp(&read(&plain, text(&ramp).as_bytes(), &NoFiles).unwrap(), scalar);
+        for order in ORDERS {
+            let msb = if order == ByteOrder::Big { "True" } else { "False" };
+            let more = format!("BinaryData = True\nBinaryDataByteOrderMSB = {msb}");
+            let data = bytes(&ramp, order);
+            assert_ramp(&read(&header(element(scalar), &more, "LOCAL"), &data, &NoFiles).unwrap(), scalar);
+            #[cfg(feature = "gzip")]
+            {
+                let packed = header(element(scalar), &format!("{more}\nCompressedData = True"), "LOCAL");
+                assert_ramp(&read(&packed, &zlib(&data), &NoFiles).unwrap(), scalar);
+                assert_ramp(&read(&packed, &gzip(&data), &NoFiles).unwrap(), scalar);
+            }
+        }
+    }
+}
+
+#[test]
+fn detached_data_in_one_file_a_list_or_a_pattern() {
+    let data = bytes(&ramp(ScalarType::U8), ByteOrder::Little);
+    let with_head = [b"head".to_vec(), data.clone()].concat();
+    let whole = files([("all of it.raw", with_head)]);
+    for skip in ["4", "-1"] {
+        let header = header("MET_UCHAR", &format!("HeaderSize = {skip}"), "all of it.raw");
+        assert_ramp(&read(&header, &[], &whole).unwrap(), ScalarType::U8);
+    }
+    let slices = files([("s1.raw", data[..12].to_vec()), ("s2.raw", data[12..].to_vec())]);
+    for names in ["LIST\ns1.raw\ns2.raw", "LIST 2\ns1.raw\ns2.raw\n", "s%d.raw 1 2 1", "s%d.raw"] {
+        assert_ramp(&read(&header("MET_UCHAR", "", names), &[], &slices).unwrap(), ScalarType::U8);
+    }
+}
+
+#[test]
+fn spacing_offset_and_directions() {
+    let more = "ElementSpacing = 2 3 4\nOffset = 10 20 30\nTransformMatrix = 0 1 0 1 0 0 0 0 -1\nAnatomicalOrientation = RAI";
+    let opened = read(&header("MET_UCHAR", more, "LOCAL"), &[0; 24], &NoFiles).unwrap();
+    assert_near(centre(&opened, 1.0, 1.0, 1.0), [13.0, 22.0, 26.0]);
+    assert_eq!((opened.frame, opened.volume.grid().spacing()), (WorldFrame::Lps, DVec3::new(2.0, 3.0, 4.0)));
+    let sized = read(&header("MET_UCHAR", "ElementSize = 2 3 4", "LOCAL"), &[0; 24], &NoFiles).unwrap();
+    assert_eq!((sized.frame, sized.volume.grid().spacing()), (WorldFrame::Plain, DVec3::new(2.0, 3.0, 4.0)));
+}
+
+#[test]
+fn two_and_four_dimensions() {
+    let flat = "NDims = 2\nDimSize = 4 3\nElementSpacing = 2 3\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
+    let flat = read(flat, &[0; 12], &NoFiles).unwrap();
+    assert_eq!(flat.volume.grid().spacing(), DVec3::new(2.0, 3.0, 1.0));
+    let series = "NDims = 4\nDimSize = 4 3 2 5\nElementSpacing = 1 1 1 9\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
+    let series = read(series, &[0; 120], &NoFiles).unwrap();
+    assert!(matches!(&series.notes[..], [Note::FirstOfAxis { n_entries: 5, .. }]));
+}
+
+#[test]
+fn headers_that_lie() {
+    let refusal = |element, more| read(&header(element, more, "LOCAL"), &[0; 23], &NoFiles).unwrap_err().to_string();
+    assert_eq!(refusal("MET_UCHAR", ""), "the data after the header holds 23 bytes; 24 are promised");
+    assert!(refusal("MET_LONG_LONG", "").contains("ElementType \"MET_LONG_LONG\" is not supported"));
+    assert!(refusal("MET_UCHAR", "ElementNumberOfChannels = 3").contains("ElementNumberOfChannels"));
+    assert!(refusal("MET_UCHAR", "TransformMatrix = 1 2 3").contains("9 numbers"));
+    assert!(refusal("MET_UCHAR", "HeaderSize = 99").contains("byte skip"));
+}

@@ -1,0 +1,211 @@
+use std::io::Cursor;
+
+use brickfield_core::glam::{DMat3, DQuat, DVec3, EulerRot, UVec3};
+use brickfield_core::{Grid, ScalarType, Volume, Voxels};
+use brickfield_io::nrrd::{self, NrrdEncoding};
+use brickfield_io::{ByteOrder, DataFiles, NoFiles, Note, Opened, ReadError, WorldFrame, open};
+use proptest::prelude::*;
+
+use crate::common::*;
+
+fn read(header: &str, data: &[u8], files: &dyn DataFiles) -> Result<Opened, ReadError> {
+    let file = [header.as_bytes(), data].concat();
+    nrrd::read(Cursor::new(file), files, &LIMITS)
+}
+
+/// A header of the ramp's sizes, with `more` lines.
+fn header(scalar: &str, more: &str) -> String {
+    format!("NRRD0005\n# a comment\ntype: {scalar}\ndimension: 3\nsizes: 4 3 2\nkey:=value: 3\n{more}\n\n")
+}
+
+fn type_name(scalar: ScalarType) -> &'static str {
+    match scalar {
+        ScalarType::U8 => "unsigned char",
+        ScalarType::I8 => "signed char",
+        ScalarType::U16 => "ushort",
+        ScalarType::I16 => "short",
+        ScalarType::U32 => "uint32_t",
+        ScalarType::I32 => "int",
+        ScalarType::F32 => "float",
+        ScalarType::F64 => "double",
+    }
+}
+
+fn order_name(order: ByteOrder) -> &'static str {
+    match order {
+        ByteOrder::Little => "little",
+        ByteOrder::Big => "big",
+    }
+}
+
+#[test]
+fn every_type_order_and_encoding() {
+    for scalar in ScalarType::ALL {
+        let ramp = ramp(scalar);
+        let plain = header(type_name(scalar), "encoding: ascii");
+        assert_ramp(&read(&plain, text(&ramp).as_bytes(), &NoFiles).unwrap(), scalar);
+        for order in ORDERS {
+            let header = |encoding| header(type_name(scalar), &format!("endian: {}\nencoding: {encoding}", order_name(order)));
+            assert_ramp(&read(&header("raw"), &bytes(&ramp, order), &NoFiles).unwrap(), scalar);
+            #[cfg(feature = "gzip")]
+            assert_ramp(&read(&header("gzip"), &gzip(&bytes(&ramp, order)), &NoFiles).unwrap(), scalar);
+        }
+    }
+}
+
+#[test]
+fn skips_come_before_the_samples() {
+    let data = bytes(&ramp(ScalarType::U8), ByteOrder::Little);
+    let lines = [b"one\ntwo\n123".to_vec(), data.clone()].concat();
+    assert_ramp(&read(&header("uint8", "encoding: raw\nline skip: 2\nbyte skip: 3"), &lines, &NoFiles).unwrap(), ScalarType::U8);
+    assert_ramp(&read(&header("uint8", "encoding: raw\nbyteskip: -1"), &lines, &NoFiles).unwrap(), ScalarType::U8);
+    let past = read(&header("uint8", "encoding: raw\nline skip: 9"), b"one\ntwo", &NoFiles).unwrap_err();
+    assert!(past.to_string().contains("line skip"), "{past}");
+}
+
+#[cfg(feature = "gzip")]
+#[test]
+fn byte_skip_of_gzip_counts_unpacked_bytes() {
+    let data = [b"123".to_vec(), bytes(&ramp(ScalarType::U8), ByteOrder::Little)].concat();
+    assert_ramp(&read(&header("uint8", "encoding: gz\nbyte skip: 3"), &gzip(&data), &NoFiles).unwrap(), ScalarType::U8);
+}
+
+#[test]
+fn detached_data_in_one_file_a_list_or_a_pattern() {
+    let data = bytes(&ramp(ScalarType::U8), ByteOrder::Little);
+    let whole = files([("all.raw", data.clone())]);
+    assert_ramp(&read(&header("uchar", "encoding: raw\ndata file: all.raw"), &[], &whole).unwrap(), ScalarType::U8);
+    let slices = files([("s 08.raw", data[..12].to_vec()), ("s 10.raw", data[12..].to_vec())]);
+    let list = header("uchar", "encoding: raw\ndata file: LIST\ns 08.raw\ns 10.raw");
+    assert_ramp(&read(&list, &[], &slices).unwrap(), ScalarType::U8);
+    let slices = files([("s08", data[..12].to_vec()), ("s10", data[12..].to_vec())]);
+    let pattern = header("uchar", "encoding: raw\ndatafile: s%02d 8 10 2");
+    assert_ramp(&read(&pattern, &[], &slices).unwrap(), ScalarType::U8);
+    let rows: Vec<_> = data.chunks(4).map(<[u8]>::to_vec).collect();
+    let rows: std::collections::BTreeMap<_, _> = rows.into_iter().enumerate().map(|(i, row)| (format!("r{}", 6 - i), row)).collect();
+    let pattern = header("uchar", "encoding: raw\ndata file: r%d 6 1 -1 1");
+    assert_ramp(&nrrd::read(Cursor::new(pattern), &rows, &LIMITS).unwrap(), ScalarType::U8);
+}
+
+#[test]
+fn spaces_become_left_posterior_superior() {
+    let placed = |space: &str| {
+        let more = format!(
+            "encoding: raw\n{space}\nspace directions: (0,2,0) (3,0,0) (0,0,-4)\nspace origin: (10,20,30)\nspace units: \"mm\" \"mm\" \"mm\""
+        );
+        read(&header("uchar", &more), &[0; 24], &NoFiles).unwrap()
+    };
+    let lps = placed("space: LPS");
+    assert_near(centre(&lps, 1.0, 1.0, 1.0), [13.0, 22.0, 26.0]);
+    assert_eq!((lps.frame, lps.unit.as_deref()), (WorldFrame::Lps, Some("mm")));
+    assert_eq!(lps.volume.grid().spacing(), DVec3::new(2.0, 3.0, 4.0));
+    assert_near(centre(&placed("space: right-anterior-superior"), 1.0, 1.0, 1.0), [-13.0, -22.0, 26.0]);
+    assert_near(centre(&placed("space: LAS"), 1.0, 1.0, 1.0), [13.0, -22.0, 26.0]);
+    let plain = placed("space dimension: 3");
+    assert_near(centre(&plain, 1.0, 1.0, 1.0), [13.0, 22.0, 26.0]);
+    assert_eq!(plain.frame, WorldFrame::Plain);
+}
+
+#[test]
+fn without_directions_spacings_and_bounds_count() {
+    let placed = |more: &str| read(&header("uchar", &format!("encoding: raw\n{more}")), &[0; 24], &NoFiles).unwrap();
+    let opened = placed("spacings: 1 NaN 0.5\naxis mins: 10 20 nan\naxis maxs: nan 26 nan");
+    assert_eq!(opened.volume.grid().spacing(), DVec3::new(1.0, 2.0, 0.5));
+    assert_near(centre(&opened, 0.0, 0.0, 0.0), [10.5, 21.0, 0.0]);
+    let node = placed("axis mins: 0 0 0\naxis maxs: 3 4 5\ncenters: node node node");
+    assert_near(centre(&node, 3.0, 2.0, 1.0), [3.0, 4.0, 5.0]);
+    let zero = placed("spacings: 1 0 1");
+    assert!(matches!(zero.notes[..], [Note::SpacingAssumed { axis: 'y', .. }]));
+}
+
+#[test]
+fn axes_beyond_space() {
+    let four = |sizes: &str, more: &str, n: usize| {
+        let header = format!("NRRD0004\ntype: uchar\ndimension: 4\nsizes: {sizes}\nencoding: raw\n{more}\n\n");
+        let data: Vec<u8> = (0..n).map(|i| i as u8).collect();
+        nrrd::read(Cursor::new([header.into_bytes(), data].concat()), &NoFiles, &LIMITS)
+    };
+    let series = four("4 3 2 5", "", 120).unwrap();
+    assert_eq!(series.volume.grid().dims(), DIMS);
+    assert!(matches!(&series.notes[..], [Note::FirstOfAxis { n_entries: 5, .. }]));
+    assert_eq!(series.volume.range().max, 23.0);
+    let flat = four("1 4 3 2", "kinds: vector domain domain domain", 24).unwrap();
+    assert_eq!((flat.volume.grid().dims(), flat.notes.len()), (DIMS, 0));
+    let colours = four("3 4 3 2", "space directions: none (1,0,0) (0,1,0) (0,0,1)", 72).unwrap_err();
+    assert!(colours.to_string().contains("number of components"), "{colours}");
+}
+
+#[test]
+fn not_finite_values_are_noted() {
+    let data = format!("nan inf {}", "0 ".repeat(22));
+    let opened = read(&header("float", "encoding: text"), data.as_bytes(), &NoFiles).unwrap();
+    assert_eq!(
+        opened.notes[0].to_string(),
+        "2 voxels are not finite (1 NaN, 1 +infinity, 0 -infinity) and were replaced"
+    );
+}
+
+#[test]
+fn headers_that_lie() {
+    let refusal = |more: &str| read(&header("uchar", more), &[0; 24], &NoFiles).unwrap_err().to_string();
+    assert_eq!(refusal("encoding: bzip2"), "encoding \"bzip2\" is not supported; raw, ascii and gzip are");
+    assert_eq!(refusal("encoding: raw\nbyte skip: 1"), "the data after the header holds 23 bytes; 24 are promised");
+    assert!(refusal("encoding: raw\ndata file: gone.raw").contains("gone.raw"));
+    assert!(refusal("encoding: raw\ndata file: s%d 1 99999999999 1").contains("number of data files"));
+    assert!(refusal("encoding: raw\ndata file: LIST").contains("number of data files"));
+    assert!(refusal("encoding: raw\nspace directions: (1,0,0) (1,0,0) (0,0,1)").contains("determinant"));
+    assert!(refusal("encoding: raw\nspace directions: (1,0,0) (1,0,0").contains("space directions"));
+    assert!(refusal("encoding: ascii").contains("24"));
+}
+
+fn any_grid() -> impl Strategy<Value = Grid> {
+    let dims = (1u32..6, 1u32..6, 1u32..6).prop_map(UVec3::from);
+    let spacing = (1e-3f64..1e3, 1e-3f64..1e3, 1e-3f64..1e3).prop_map(DVec3::from);
+    let origin = (-1e7f64..1e7, -1e7f64..1e7, -1e7f64..1e7).prop_map(DVec3::from);
+    let angles = (-3.0f64..3.0, -3.0f64..3.0, -3.0f64..3.0);
+    (dims, spacing, origin, angles).prop_map(|(dims, spacing, origin, (a, b, c))| {
+        let direction = DMat3::from_quat(DQuat::from_euler(EulerRot::XYZ, a, b, c));
+        Grid::from_first_sample(dims, spacing, origin, direction).unwrap()
+    })
+}
+
+fn any_voxels(n: usize) -> impl Strategy<Value = Voxels> {
+    prop_oneof![
+        prop::collection::vec(any::<u8>(), n).prop_map(Voxels::from),
+        prop::collection::vec(any::<i16>(), n).prop_map(Voxels::from),
+        prop::collection::vec(any::<u32>(), n).prop_map(Voxels::from),
+        prop::collection::vec(prop::num::f32::ANY, n).prop_map(Voxels::from),
+        prop::collection::vec(prop::num::f64::NORMAL, n).prop_map(Voxels::from),
+    ]
+}
+
+proptest! {
+    #[test]
+    fn what_is_saved_is_read_back(
+        volume in any_grid().prop_flat_map(|grid| {
+            any_voxels(grid.n_voxels()).prop_map(move |voxels| Volume::new(grid, voxels).unwrap())
+        }),
+        frame in prop_oneof![Just(WorldFrame::Lps), Just(WorldFrame::Plain)],
+    ) {
+        let mut encodings = vec![NrrdEncoding::Raw];
+        #[cfg(feature = "gzip")]
+        encodings.push(NrrdEncoding::Gzip);
+        for encoding in encodings {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("volume.nrrd");
+            nrrd::save(&path, &volume, frame, encoding).unwrap();
+            let opened = open(&path, &LIMITS).unwrap();
+            prop_assert_eq!(opened.volume.voxels(), volume.voxels());
+            prop_assert_eq!(opened.frame, frame);
+            let (a, b) = (opened.volume.grid().index_to_world(), volume.grid().index_to_world());
+            prop_assert!(a.matrix3.abs_diff_eq(b.matrix3, 1e-9 * 1e3), "{} {}", a, b);
+            prop_assert!(a.translation.abs_diff_eq(b.translation, 1e-7), "{} {}", a, b);
+            prop_assert_eq!(folder.path().read_dir().unwrap().count(), 1);
+        }
+    }
+
+    #[test]
+    fn no_header_panics(header in "(NRRD0004\n)?((sizes|type|dimension|encoding|endian|space|data file|spacings): [ -~]{0,20}\n){0,8}\n?[ -~]{0,30}") {
+        let _ = nrrd::read(Cursor::new(header), &NoFiles, &LIMITS);
+    }
+}

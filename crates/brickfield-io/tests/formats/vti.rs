@@ -1,0 +1,178 @@
+use std::io::Cursor;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{ScalarType, Voxels};
+use brickfield_io::{ByteOrder, Note, Opened, ReadError, vti};
+
+use crate::common::*;
+
+fn read(file: impl AsRef<[u8]>) -> Result<Opened, ReadError> {
+    vti::read(Cursor::new(file.as_ref()), &LIMITS)
+}
+
+fn type_name(scalar: ScalarType) -> &'static str {
+    match scalar {
+        ScalarType::U8 => "UInt8",
+        ScalarType::I8 => "Int8",
+        ScalarType::U16 => "UInt16",
+        ScalarType::I16 => "Int16",
+        ScalarType::U32 => "UInt32",
+        ScalarType::I32 => "Int32",
+        ScalarType::F32 => "Float32",
+        ScalarType::F64 => "Float64",
+    }
+}
+
+/// Everything around the array.
+#[derive(Clone, Copy)]
+struct Style {
+    order: ByteOrder,
+    word_bytes: usize,
+    compressor: &'static str,
+}
+
+impl Style {
+    fn root(&self) -> String {
+        let order = if self.order == ByteOrder::Big { "BigEndian" } else { "LittleEndian" };
+        let (bits, compressor) = (8 * self.word_bytes, self.compressor);
+        format!(
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" byte_order=\"{order}\" header_type=\"UInt{bits}\"{compressor}>"
+        )
+    }
+
+    fn words(&self, words: &[usize]) -> Vec<u8> {
+        let word = |w: &usize| match (self.order, self.word_bytes) {
+            (ByteOrder::Little, n) => w.to_le_bytes()[..n].to_vec(),
+            (ByteOrder::Big, n) => w.to_be_bytes()[8 - n..].to_vec(),
+        };
+        words.iter().flat_map(word).collect()
+    }
+
+    /// The header, and the data in zlib blocks of 10 bytes, the last one partial.
+    fn blocks(&self, data: &[u8]) -> (Vec<u8>, Vec<u8>) {
+        let blocks: Vec<Vec<u8>> = data.chunks(10).map(zlib).collect();
+        let mut words = vec![blocks.len(), 10, data.len() % 10];
+        words.extend(blocks.iter().map(Vec::len));
+        (self.words(&words), blocks.concat())
+    }
+}
+
+const PLAIN: Style = Style { order: ByteOrder::Little, word_bytes: 4, compressor: "" };
+
+fn inline(style: Style, array: &str, numbers: &str) -> String {
+    format!(
+        "{}<ImageData WholeExtent=\"0 3 0 2 0 1\" Origin=\"0 0 0\" Spacing=\"1 1 1\"><Piece Extent=\"0 3 0 2 0 1\">\
+         <PointData Scalars=\"a\"><DataArray Name=\"a\" {array}>\n {numbers}\n</DataArray></PointData></Piece></ImageData></VTKFile>",
+        style.root()
+    )
+}
+
+fn appended(style: Style, array: &str, encoding: &str, data: &[u8]) -> Vec<u8> {
+    let head = format!(
+        "{}<ImageData WholeExtent=\"0 3 0 2 0 1\"><Piece Extent=\"0 3 0 2 0 1\"><PointData Scalars=\"a\">\
+         <DataArray Name=\"a\" format=\"appended\" {array}/></PointData><CellData/></Piece></ImageData>\
+         <AppendedData encoding=\"{encoding}\">\n  _",
+        style.root()
+    );
+    [head.as_bytes(), data, b"\n</AppendedData></VTKFile>"].concat()
+}
+
+#[test]
+fn every_type_order_word_and_encoding() {
+    for scalar in ScalarType::ALL {
+        let ramp = ramp(scalar);
+        let type_name = type_name(scalar);
+        assert_ramp(&read(inline(PLAIN, &format!("type=\"{type_name}\" format=\"ascii\""), &text(&ramp))).unwrap(), scalar);
+        for (order, word_bytes) in [(ORDERS[0], 4), (ORDERS[0], 8), (ORDERS[1], 4), (ORDERS[1], 8)] {
+            let data = bytes(&ramp, order);
+            let style = Style { order, word_bytes, compressor: "" };
+            let header = style.words(&[data.len()]);
+            check(style, type_name, scalar, &header, &data);
+            let style = Style { compressor: " compressor=\"vtkZLibDataCompressor\"", ..style };
+            let (header, blocks) = style.blocks(&data);
+            check(style, type_name, scalar, &header, &blocks);
+        }
+    }
+}
+
+/// Inline and appended, raw and in base64, the latter as one run and as two.
+fn check(style: Style, type_name: &str, scalar: ScalarType, header: &[u8], data: &[u8]) {
+    let one_run = STANDARD.encode([header, data].concat());
+    let two_runs = STANDARD.encode(header) + &STANDARD.encode(data);
+    for text in [&one_run, &two_runs] {
+        let broken = format!("{}\n  {}", &text[..7], &text[7..]);
+        let file = inline(style, &format!("type=\"{type_name}\" format=\"binary\""), &broken);
+        assert_ramp(&read(file).unwrap(), scalar);
+        let file = appended(style, &format!("type=\"{type_name}\" offset=\"4\""), "base64", format!("abc={text}").as_bytes());
+        assert_ramp(&read(file).unwrap(), scalar);
+    }
+    let raw = [b"<_&", header, data].concat();
+    let file = appended(style, &format!("type=\"{type_name}\" offset=\"3\""), "raw", &raw);
+    assert_ramp(&read(file).unwrap(), scalar);
+}
+
+#[test]
+fn extent_origin_spacing_and_direction() {
+    let file = inline(PLAIN, "type=\"UInt8\"", &"1 ".repeat(24))
+        .replace("Extent=\"0 3 0 2 0 1\"", "Extent=\"-1 2 10 12 5 6\"")
+        .replace("Origin=\"0 0 0\" Spacing=\"1 1 1\"", "Origin=\"1 2 3\" Spacing=\"2 3 4\" Direction=\"0 1 0 1 0 0 0 0 -1\"");
+    let opened = read(file).unwrap();
+    assert_eq!(opened.volume.grid().dims(), DIMS);
+    assert_eq!(opened.volume.grid().spacing(), DVec3::new(2.0, 3.0, 4.0));
+    assert_near(centre(&opened, 0.0, 0.0, 0.0), [31.0, 0.0, -17.0]);
+    assert_near(centre(&opened, 1.0, 0.0, 0.0), [31.0, 2.0, -17.0]);
+}
+
+#[test]
+fn cell_data_lie_at_cell_centres() {
+    let file = inline(PLAIN, "type=\"UInt8\"", "1 2 3 4 5 6").replace("PointData", "CellData");
+    let opened = read(file).unwrap();
+    assert_eq!(opened.volume.grid().dims(), UVec3::new(3, 2, 1));
+    assert_near(centre(&opened, 0.0, 0.0, 0.0), [0.5, 0.5, 0.5]);
+    assert_eq!(opened.volume.voxels(), &Voxels::U8(vec![1, 2, 3, 4, 5, 6]));
+}
+
+#[test]
+fn the_active_scalars_of_several_arrays() {
+    let other = "<DataArray type=\"Float32\" Name=\"b\" NumberOfComponents=\"3\">0</DataArray><DataArray Name=\"a\"";
+    let zeros = "0 ".repeat(24);
+    let file = inline(PLAIN, "type=\"UInt8\"", &zeros).replace("<DataArray Name=\"a\"", other);
+    let opened = read(&file).unwrap();
+    assert_eq!(opened.notes, [Note::SeveralArrays { kept: "a".to_owned(), n_arrays: 2 }]);
+    assert_eq!(read(file.replace("Scalars=\"a\"", "")).unwrap().notes, opened.notes);
+    let vector = read(file.replace("Scalars=\"a\"", "Scalars=\"b\"")).unwrap_err().to_string();
+    assert!(vector.contains("NumberOfComponents \"3 of array b\" is not supported"), "{vector}");
+}
+
+#[test]
+fn documents_that_lie() {
+    let zeros = "0 ".repeat(24);
+    let file = inline(PLAIN, "type=\"UInt8\"", &zeros);
+    let refusal = |from: &str, to: &str| {
+        assert!(file.contains(from), "{from}");
+        read(file.replace(from, to)).unwrap_err().to_string()
+    };
+    assert!(refusal("0 3 0 2 0 1", "0 3 0 2 0 9223372036854775807").contains("limit"));
+    assert!(refusal("0 3 0 2 0 1", "0 3 0 2 0 -7").contains("Extent"));
+    assert!(refusal("0 3 0 2 0 1", "0 3").contains("6 numbers"));
+    assert!(refusal("type=\"UInt8\"", "type=\"Int64\"").contains("DataArray type \"Int64\" is not supported"));
+    assert!(refusal("type=\"ImageData\"", "type=\"PolyData\"").contains("PolyData"));
+    assert!(refusal("<VTKFile", "<HTML").contains("root element"));
+    assert!(refusal("</Piece>", "</Piece><Piece Extent=\"0 1 0 1 0 1\"></Piece>").contains("number of pieces"));
+    assert!(refusal("DataArray ", "NoArray ").contains("DataArray"));
+    assert!(refusal("0 </Data", "</Data").contains("too few") || refusal("0 \n</Data", "</Data").contains("23 samples"));
+    assert!(refusal("0 \n</Data", "x</Data").contains("sample 23"));
+    assert!(refusal("UInt32\"", "UInt32\" compressor=\"vtkLZ4DataCompressor\"").contains("LZ4"));
+    let bad = |data: &[u8], compressor| {
+        let style = Style { compressor, ..PLAIN };
+        read(appended(style, "type=\"UInt8\" offset=\"0\"", "raw", data)).unwrap_err().to_string()
+    };
+    assert!(bad(&PLAIN.words(&[25]), "").contains("length of DataArray"));
+    assert!(bad(&PLAIN.words(&[24]), "").contains("24 are promised"));
+    let zlib = " compressor=\"vtkZLibDataCompressor\"";
+    assert!(bad(&PLAIN.words(&[1, 24, 0, 5, 0]), zlib).contains("cannot read"));
+    assert!(bad(&PLAIN.words(&[usize::MAX, 24, 0]), zlib).contains("length of DataArray"));
+    assert!(bad(&PLAIN.words(&[u32::MAX as usize, 0, 24]), zlib).contains("promised"));
+}
