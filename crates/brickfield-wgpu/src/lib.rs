@@ -1,1 +1,13 @@
 #![doc = include_str!("../README.md")]
+
+mod adapter;
+mod atlas;
+mod backend;
+mod buffer;
+mod clock;
+mod device;
+mod picture;
+mod pipeline;
+
+pub use adapter::{AdapterChoice, AdapterSummary, OpenError, adapters};
+pub use backend::WgpuBackend;

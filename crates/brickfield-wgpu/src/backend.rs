@@ -1,0 +1,304 @@
+//! The backend: what stays on the device, and the replay of a plan.
+
+use std::time::Instant;
+
+use brickfield_core::Image;
+use brickfield_core::glam::UVec2;
+use brickfield_frame::{
+    AtlasShape, Backend, Description, Feature, Frame, FramePlan, FrameUniforms, KnotUniform, RenderError,
+    ShaderFunction, Timing,
+};
+use brickfield_shaders::{Entry, ShaderLibrary, Variant, shader_inputs, shader_outputs};
+use wgpu::{BufferUsages, Features};
+
+use crate::atlas::{self, Atlas};
+use crate::buffer::Reused;
+use crate::clock::Clock;
+use crate::device::Device;
+use crate::picture::{self, Picture};
+use crate::pipeline::{Pipeline, Pipelines};
+use crate::{AdapterChoice, OpenError, adapter};
+
+/// Renders frame plans through wgpu, without a window.
+///
+/// On the device stay: the atlas of the last plan's bricks (as long as a plan holds the same [`Arc`](std::sync::Arc)), the
+/// pipeline of each shader variant, the picture, and buffers that grow when they must.
+pub struct WgpuBackend {
+    device: Device,
+    pipelines: Pipelines,
+    clock: Option<Clock>,
+    scene: Scene,
+    staging: Reused,
+    outputs: Outputs,
+}
+
+/// What a shader reads and writes.
+struct Scene {
+    uniforms: Reused,
+    index: Reused,
+    knots: Reused,
+    inputs: Reused,
+    results: Reused,
+    sampler: wgpu::Sampler,
+    atlas: Option<Atlas>,
+    picture: Option<Picture>,
+}
+
+/// What comes back from evaluated functions.
+struct Outputs {
+    staging: Reused,
+}
+
+/// Inputs of a function that are evaluated at a time.
+const EVALUATED_AT_ONCE: usize = 1 << 20;
+
+impl WgpuBackend {
+    /// Opens an adapter.
+    ///
+    /// # Errors
+    /// If there is none, not the one chosen, or if it gives no device. The message says which there are.
+    pub fn new(choice: &AdapterChoice) -> Result<WgpuBackend, OpenError> {
+        let device = adapter::open(choice)?;
+        Ok(WgpuBackend {
+            pipelines: Pipelines::default(),
+            clock: Clock::new(&device),
+            scene: Scene::new(&device),
+            staging: picture::staging(),
+            outputs: Outputs {
+                staging: Reused::new("reading results back", BufferUsages::MAP_READ | BufferUsages::COPY_DST),
+            },
+            device,
+        })
+    }
+
+    /// Takes another shader library; the pipelines built so far are dropped.
+    ///
+    /// For conformance runs, which must notice a library that is wrong in one place.
+    pub fn set_library(&mut self, library: ShaderLibrary) {
+        self.pipelines = Pipelines::new(library);
+    }
+
+    fn check_size(&self, size: UVec2) -> Result<(), RenderError> {
+        let limit = self.device.description.capabilities.max_image;
+        if size.max_element() > limit {
+            return Err(RenderError::ImageTooLarge { size, limit });
+        }
+        Ok(())
+    }
+
+    fn check_features(&self, plan: &FramePlan) -> Result<(), RenderError> {
+        let filtered_floats = plan.features.contains(Feature::HardwareFilter)
+            && plan.bricks.format() == brickfield_frame::SampleFormat::Float32;
+        if filtered_floats && !self.device.has(Features::FLOAT32_FILTERABLE) {
+            return Err(RenderError::Unsupported { what: "filter 32-bit floats in hardware (FLOAT32_FILTERABLE)" });
+        }
+        Ok(())
+    }
+
+    /// Runs the march over the picture; device and wall time in milliseconds.
+    fn march(&mut self, plan: &FramePlan) -> Result<(Option<f64>, f64), RenderError> {
+        let size = plan.size();
+        let pipeline = self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?;
+        let [x, y, _] = pipeline.workgroup_size;
+        let groups = [size.x.div_ceil(x), size.y.div_ceil(y), 1];
+        let clock = self.clock.as_ref();
+        let started = Instant::now();
+        dispatch(&self.device, pipeline, &self.scene, groups, clock)?;
+        self.device.wait("rendering")?;
+        let wall_ms = milliseconds(started);
+        let device_ms = clock.map(|c| c.milliseconds(&self.device)).transpose()?;
+        Ok((device_ms, wall_ms))
+    }
+
+    fn evaluate_some(&mut self, variant: Variant, inputs: &[[f32; 4]]) -> Result<Vec<[f32; 4]>, RenderError> {
+        let n_bytes = size_of_val(inputs) as u64;
+        self.scene.inputs.write(&self.device, bytemuck::cast_slice(inputs))?;
+        self.scene.results.reserve(&self.device, n_bytes)?;
+        let pipeline = self.pipelines.of(&self.device, variant)?;
+        let groups = (inputs.len() as u32).div_ceil(pipeline.workgroup_size[0]);
+        dispatch(&self.device, pipeline, &self.scene, [groups, 1, 1], None)?;
+        self.outputs.read(&self.device, &self.scene.results, n_bytes)
+    }
+}
+
+impl Backend for WgpuBackend {
+    fn describe(&self) -> &Description {
+        &self.device.description
+    }
+
+    fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
+        let size = plan.size();
+        self.check_size(size)?;
+        if size.min_element() == 0 || plan.visible.is_empty() || plan.domain.is_empty() {
+            return Ok(Frame { image: Image::transparent(size), timing: Timing::default() });
+        }
+        self.check_features(plan)?;
+        let started = Instant::now();
+        let pipeline = self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?;
+        self.scene.update(&self.device, plan, pipeline)?;
+        self.scene.resize(&self.device, size)?;
+        self.device.queue.submit([]);
+        self.device.wait("uploading")?;
+        let upload_ms = milliseconds(started);
+        let (device_ms, wall_ms) = self.march(plan)?;
+        let started = Instant::now();
+        let Some(picture) = &self.scene.picture else { return Err(unbound()) };
+        let image = picture.read(&self.device, &mut self.staging)?;
+        Ok(Frame { image, timing: Timing { upload_ms, device_ms, wall_ms, read_back_ms: milliseconds(started) } })
+    }
+
+    fn evaluate(
+        &mut self,
+        plan: &FramePlan,
+        function: ShaderFunction,
+        inputs: &[[f32; 4]],
+    ) -> Result<Vec<[f32; 4]>, RenderError> {
+        self.check_features(plan)?;
+        let variant = Variant::of(plan, Entry::Evaluate(function));
+        let pipeline = self.pipelines.of(&self.device, variant)?;
+        self.scene.update(&self.device, plan, pipeline)?;
+        let mut results = Vec::with_capacity(inputs.len());
+        for some in shader_inputs(plan, function, inputs).chunks(EVALUATED_AT_ONCE) {
+            results.extend(self.evaluate_some(variant, some)?);
+        }
+        Ok(shader_outputs(plan, function, &results))
+    }
+}
+
+impl Scene {
+    fn new(device: &Device) -> Scene {
+        let storage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+        let linear = wgpu::FilterMode::Linear;
+        Scene {
+            uniforms: Reused::new("the frame's uniforms", BufferUsages::UNIFORM | BufferUsages::COPY_DST),
+            index: Reused::new("the brick index", storage),
+            knots: Reused::new("the transfer function", storage),
+            inputs: Reused::new("the inputs", storage),
+            results: Reused::new("the results", BufferUsages::STORAGE | BufferUsages::COPY_SRC),
+            sampler: device.device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("atlas"),
+                mag_filter: linear,
+                min_filter: linear,
+                ..wgpu::SamplerDescriptor::default()
+            }),
+            atlas: None,
+            picture: None,
+        }
+    }
+
+    /// Brings to the device what `pipeline` reads of `plan`.
+    fn update(&mut self, device: &Device, plan: &FramePlan, pipeline: &Pipeline) -> Result<(), RenderError> {
+        let shape = if pipeline.binds(1) {
+            self.hold_atlas(device, plan)?
+        } else {
+            AtlasShape { bricks: brickfield_core::glam::UVec3::ONE, side: plan.bricks.side() }
+        };
+        if pipeline.binds(0) {
+            self.uniforms.write(device, bytemuck::bytes_of(&FrameUniforms::of(plan, shape)))?;
+        }
+        if pipeline.binds(3) {
+            self.index.write(device, bytemuck::cast_slice(plan.index.words()))?;
+        }
+        if pipeline.binds(4) {
+            self.knots.write(device, bytemuck::cast_slice(&KnotUniform::of(plan)))?;
+        }
+        Ok(())
+    }
+
+    fn hold_atlas(&mut self, device: &Device, plan: &FramePlan) -> Result<AtlasShape, RenderError> {
+        let shape = atlas::shape(device, &plan.bricks)?;
+        if !self.atlas.as_ref().is_some_and(|a| a.holds(&plan.bricks)) {
+            // The old one goes first: both may not fit.
+            self.atlas = None;
+            self.atlas = Some(Atlas::upload(device, &plan.bricks, shape)?);
+        }
+        Ok(shape)
+    }
+
+    fn resize(&mut self, device: &Device, size: UVec2) -> Result<(), RenderError> {
+        if !self.picture.as_ref().is_some_and(|p| p.has_size(size)) {
+            self.picture = None;
+            self.picture = Some(Picture::new(device, size)?);
+        }
+        Ok(())
+    }
+
+    /// What goes with a binding number of the shaders.
+    fn resource(&self, index: u32) -> Option<wgpu::BindingResource<'_>> {
+        match index {
+            0 => self.uniforms.binding(),
+            1 => self.atlas.as_ref().map(|a| wgpu::BindingResource::TextureView(&a.view)),
+            2 => Some(wgpu::BindingResource::Sampler(&self.sampler)),
+            3 => self.index.binding(),
+            4 => self.knots.binding(),
+            5 => self.picture.as_ref().map(|p| wgpu::BindingResource::TextureView(&p.view)),
+            6 => self.inputs.binding(),
+            7 => self.results.binding(),
+            _ => None,
+        }
+    }
+
+    fn bind(&self, device: &Device, pipeline: &Pipeline) -> Result<wgpu::BindGroup, RenderError> {
+        let entry = |binding: u32| Some(wgpu::BindGroupEntry { binding, resource: self.resource(binding)? });
+        let entries = pipeline.bindings.iter().map(|b| entry(b.index)).collect::<Option<Vec<_>>>();
+        let entries = entries.ok_or_else(unbound)?;
+        device.checked("binding the scene", 0, || {
+            device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("scene"),
+                layout: &pipeline.layout,
+                entries: &entries,
+            })
+        })
+    }
+}
+
+impl Outputs {
+    fn read(&mut self, device: &Device, results: &Reused, n_bytes: u64) -> Result<Vec<[f32; 4]>, RenderError> {
+        let Some(from) = results.buffer() else { return Err(unbound()) };
+        let to = self.staging.reserve(device, n_bytes)?;
+        device.checked("copying the results", n_bytes, || {
+            let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            encoder.copy_buffer_to_buffer(from, 0, to, 0, n_bytes);
+            device.queue.submit([encoder.finish()]);
+        })?;
+        let view = device.read(to, n_bytes)?;
+        let results = bytemuck::pod_collect_to_vec(&view);
+        drop(view);
+        to.unmap();
+        Ok(results)
+    }
+}
+
+fn dispatch(
+    device: &Device,
+    pipeline: &Pipeline,
+    scene: &Scene,
+    groups: [u32; 3],
+    clock: Option<&Clock>,
+) -> Result<(), RenderError> {
+    let bound = scene.bind(device, pipeline)?;
+    device.checked("running a shader", 0, || {
+        let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("brickfield"),
+            timestamp_writes: clock.map(Clock::writes),
+        });
+        pass.set_pipeline(&pipeline.pipeline);
+        pass.set_bind_group(0, &bound, &[]);
+        pass.dispatch_workgroups(groups[0], groups[1], groups[2]);
+        drop(pass);
+        if let Some(clock) = clock {
+            clock.resolve(&mut encoder);
+        }
+        device.queue.submit([encoder.finish()]);
+    })
+}
+
+/// A shader asks for something that no plan holds: a defect of a patched library.
+fn unbound() -> RenderError {
+    RenderError::Shader { message: "it binds what the backend does not have".to_owned() }
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}

@@ -1,0 +1,85 @@
+//! The picture on the device, and its way back.
+
+use brickfield_core::Image;
+use brickfield_core::glam::UVec2;
+use brickfield_frame::RenderError;
+use wgpu::BufferUsages;
+
+use crate::buffer::Reused;
+use crate::device::Device;
+
+/// The picture's texels.
+pub(crate) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+const PIXEL_BYTES: u32 = 16;
+
+/// A picture of some size.
+pub(crate) struct Picture {
+    size: UVec2,
+    texture: wgpu::Texture,
+    pub(crate) view: wgpu::TextureView,
+}
+
+impl Picture {
+    pub(crate) fn new(device: &Device, size: UVec2) -> Result<Picture, RenderError> {
+        let n_bytes = u64::from(size.x) * u64::from(size.y) * u64::from(PIXEL_BYTES);
+        device.checked("the picture", n_bytes, || {
+            let texture = device.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("picture"),
+                size: extent(size),
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: FORMAT,
+                usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_SRC,
+                view_formats: &[],
+            });
+            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+            Picture { size, texture, view }
+        })
+    }
+
+    pub(crate) fn has_size(&self, size: UVec2) -> bool {
+        self.size == size
+    }
+
+    /// Brings the picture back, through `staging`.
+    pub(crate) fn read(&self, device: &Device, staging: &mut Reused) -> Result<Image<f32>, RenderError> {
+        let row_bytes = (self.size.x * PIXEL_BYTES).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let n_bytes = u64::from(row_bytes) * u64::from(self.size.y);
+        let buffer = staging.reserve(device, n_bytes)?;
+        device.checked("copying the picture", n_bytes, || {
+            let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let layout =
+                wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row_bytes), rows_per_image: None };
+            encoder.copy_texture_to_buffer(
+                self.texture.as_image_copy(),
+                wgpu::TexelCopyBufferInfo { buffer, layout },
+                extent(self.size),
+            );
+            device.queue.submit([encoder.finish()]);
+        })?;
+        let view = device.read(buffer, n_bytes)?;
+        let image = unpadded(&view, self.size, row_bytes as usize);
+        drop(view);
+        buffer.unmap();
+        Ok(image)
+    }
+}
+
+/// What a picture comes back through.
+pub(crate) const fn staging() -> Reused {
+    Reused::new("reading the picture back", BufferUsages::MAP_READ.union(BufferUsages::COPY_DST))
+}
+
+fn extent(size: UVec2) -> wgpu::Extent3d {
+    wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 }
+}
+
+fn unpadded(bytes: &[u8], size: UVec2, row_bytes: usize) -> Image<f32> {
+    let mut image = Image::transparent(size);
+    let width = size.x as usize;
+    for (row, from) in image.pixels_mut().chunks_exact_mut(width).zip(bytes.chunks_exact(row_bytes)) {
+        bytemuck::cast_slice_mut(row).copy_from_slice(&from[..width * PIXEL_BYTES as usize]);
+    }
+    image
+}
