@@ -1,1 +1,17 @@
 #![doc = include_str!("../README.md")]
+
+mod atlas;
+mod backend;
+mod error;
+mod evaluate;
+mod march;
+mod options;
+mod scene;
+mod staging;
+mod variants;
+mod vulkan;
+
+pub use backend::AshBackend;
+pub use error::ConnectError;
+pub use options::{AdapterChoice, AdapterKind, AdapterSummary, Options, Validation, adapters};
+pub use vulkan::ValidationLog;

@@ -1,0 +1,116 @@
+//! The bricks of a plan in one 3-D texture.
+
+use std::sync::{Arc, Weak};
+
+use ash::vk;
+use brickfield_core::glam::UVec3;
+use brickfield_frame::{AtlasShape, BrickSet, RenderError, SampleFormat};
+
+use crate::staging::{CHUNK_BYTES, Staging};
+use crate::vulkan::{Device, Image, ImageBox, Queue, Use};
+
+/// A set of bricks on the device.
+///
+/// The set is remembered without being kept: an address in a [`Weak`] is not used again while the `Weak` lives, so the
+/// host's copy of the bricks may go while the device's stays.
+pub(crate) struct Atlas {
+    image: Image,
+    set: Weak<BrickSet>,
+}
+
+impl Atlas {
+    /// Whether this is the atlas of that set.
+    pub(crate) fn holds(&self, set: &Arc<BrickSet>) -> bool {
+        std::ptr::eq(self.set.as_ptr(), Arc::as_ptr(set))
+    }
+
+    /// The texture.
+    pub(crate) fn image(&self) -> &Image {
+        &self.image
+    }
+
+    /// Brings a set to the device, chunk by chunk.
+    pub(crate) fn upload(
+        device: &Arc<Device>,
+        queue: &mut Queue,
+        staging: &mut Staging,
+        set: &Arc<BrickSet>,
+        shape: AtlasShape,
+    ) -> Result<Atlas, RenderError> {
+        let image = Image::texture_3d(device, vulkan_format(set.format()), shape.texels())?;
+        queue.run("preparing the brick atlas", |recorder| {
+            recorder.image_barrier(&image, Use::Nothing, Use::CopyTarget);
+            if shape.bricks.element_product() > set.n_bricks() {
+                // What no brick fills is never part of a sample, but a filter may read it with weight 0: no NaN there.
+                recorder.clear(&image);
+                recorder.barrier(Use::CopyTarget, Use::CopyTarget);
+            }
+        })?;
+        let bricks_per_chunk = (CHUNK_BYTES / set.brick_bytes()).max(1);
+        for (i, bytes) in set.bytes().chunks(bricks_per_chunk * set.brick_bytes()).enumerate() {
+            let first_slot = (i * bricks_per_chunk) as u32;
+            copy_chunk(queue, staging, &image, &chunk_boxes(set, shape, first_slot, bytes), bytes, set.format())?;
+        }
+        staging.shrink();
+        queue.run("finishing the brick atlas", |recorder| {
+            recorder.image_barrier(&image, Use::CopyTarget, Use::ShaderRead);
+        })?;
+        Ok(Atlas { image, set: Arc::downgrade(set) })
+    }
+}
+
+/// The shape of a set's atlas on a device with 3-D textures of at most `limit` texels a side.
+pub(crate) fn atlas_shape(set: &BrickSet, limit: u32) -> Result<AtlasShape, RenderError> {
+    let too_large = RenderError::AtlasTooLarge { n_bricks: set.n_bricks(), side: set.side().n_samples(), limit };
+    set.atlas(limit).ok_or(too_large)
+}
+
+/// Checks that shaders can read a format, through a filter if they use a sampler.
+pub(crate) fn check_format(
+    device: &Device,
+    format: SampleFormat,
+    needed: vk::FormatFeatureFlags,
+) -> Result<(), RenderError> {
+    let what = match format {
+        SampleFormat::Unorm8 => "sample (or filter, in fast mode) 8-bit normalised textures",
+        SampleFormat::Unorm16 => "sample (or filter, in fast mode) 16-bit normalised textures",
+        SampleFormat::Float32 => "sample (or filter, in fast mode) 32-bit float textures",
+    };
+    match device.format_features(vulkan_format(format)).contains(needed) {
+        true => Ok(()),
+        false => Err(RenderError::Unsupported { what }),
+    }
+}
+
+fn copy_chunk(
+    queue: &mut Queue,
+    staging: &mut Staging,
+    image: &Image,
+    boxes: &[ImageBox],
+    bytes: &[u8],
+    format: SampleFormat,
+) -> Result<(), RenderError> {
+    let buffer = staging.upload(bytes.len())?;
+    buffer.write(0, bytes);
+    let buffer = &*buffer;
+    queue.run("uploading bricks", |recorder| recorder.fill(buffer, image, format.n_bytes() as u64, boxes))
+}
+
+/// One copy for each brick, from its place in the chunk to its slot.
+fn chunk_boxes(set: &BrickSet, shape: AtlasShape, first_slot: u32, bytes: &[u8]) -> Vec<ImageBox> {
+    let n = (bytes.len() / set.brick_bytes()) as u32;
+    let at = |i: u32| ImageBox {
+        buffer_offset: u64::from(i) * set.brick_bytes() as u64,
+        origin: shape.origin(first_slot + i),
+        extent: UVec3::splat(set.side().n_samples()),
+    };
+    (0..n).map(at).collect()
+}
+
+fn vulkan_format(format: SampleFormat) -> vk::Format {
+    match format {
+        SampleFormat::Unorm8 => vk::Format::R8_UNORM,
+        SampleFormat::Unorm16 => vk::Format::R16_UNORM,
+        SampleFormat::Float32 => vk::Format::R32_SFLOAT,
+    }
+}

@@ -1,0 +1,142 @@
+//! The backend: a device, what it holds, and how a plan is replayed on it.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use brickfield_core::Image as Picture;
+use brickfield_frame::{Backend, Capabilities, Description, Frame, FramePlan, RenderError, ShaderFunction, Timing};
+use brickfield_shaders::{Entry, ShaderLibrary, Variant};
+
+use crate::evaluate::Lists;
+use crate::march::{groups_per_submit, march, milliseconds_since, read_back, reserve_picture};
+use crate::options::choose;
+use crate::scene::Scene;
+use crate::staging::Staging;
+use crate::variants::Variants;
+use crate::vulkan::{Device, Image, Instance, PhysicalDevice, Queue, Resource, physical_devices};
+use crate::{ConnectError, Options, ValidationLog};
+
+/// Replays frame plans through Vulkan, without a window.
+pub struct AshBackend {
+    pub(crate) device: Arc<Device>,
+    pub(crate) queue: Queue,
+    pub(crate) variants: Variants,
+    pub(crate) scene: Scene,
+    pub(crate) staging: Staging,
+    pub(crate) lists: Lists,
+    picture: Option<Image>,
+    description: Description,
+}
+
+impl AshBackend {
+    /// Connects to an adapter.
+    ///
+    /// # Errors
+    /// No Vulkan loader, no device or not the one asked for, no validation layer if asked for, a driver that fails.
+    pub fn new(options: &Options) -> Result<AshBackend, ConnectError> {
+        let instance = Instance::new(options.validation)?;
+        let mut there = physical_devices(&instance)?;
+        let summaries: Vec<_> = there.iter().map(|d| d.summary.clone()).collect();
+        let chosen = there.swap_remove(choose(&options.adapter, &summaries)?);
+        let description = describe(&chosen);
+        let device = Device::new(instance, chosen)?;
+        Ok(AshBackend {
+            queue: Queue::new(&device)?,
+            variants: Variants::new(ShaderLibrary::embedded()),
+            scene: Scene::new(&device)?,
+            staging: Staging::new(&device),
+            lists: Lists::new(),
+            picture: None,
+            description,
+            device,
+        })
+    }
+
+    /// The backend with other shader sources: conformance runs see by them whether their cases notice a defect.
+    #[must_use]
+    pub fn with_library(mut self, library: ShaderLibrary) -> AshBackend {
+        self.set_library(library);
+        self
+    }
+
+    /// Replaces the shader sources.
+    pub fn set_library(&mut self, library: ShaderLibrary) {
+        self.variants = Variants::new(library);
+    }
+
+    /// What the validation layer said so far; empty if it was not asked for.
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.validation_log().messages()
+    }
+
+    /// The same as a log that outlives the backend, to see what is said about its end.
+    pub fn validation_log(&self) -> ValidationLog {
+        self.device.instance().log().clone()
+    }
+
+    fn replay(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
+        let started = Instant::now();
+        let pipeline = self.variants.pipeline(&self.device, Variant::of(plan, Entry::March))?;
+        self.scene.upload(&mut self.queue, &mut self.staging, plan, pipeline)?;
+        let picture = reserve_picture(&mut self.picture, &self.device, plan.size())?;
+        let groups_per_submit = groups_per_submit(plan, pipeline.workgroup_size()[1]);
+        let scene = &self.scene;
+        let bound = pipeline.bind(|binding| match binding {
+            5 => Some(Resource::Picture(picture)),
+            _ => scene.resource(binding),
+        })?;
+        let upload_ms = milliseconds_since(started);
+        let time = march(&mut self.queue, &bound, picture, groups_per_submit)?;
+        let marched = Instant::now();
+        let image = read_back(&mut self.queue, &mut self.staging, picture)?;
+        let read_back_ms = milliseconds_since(marched);
+        Ok(Frame {
+            image,
+            timing: Timing { upload_ms, device_ms: time.device_ms, wall_ms: time.wall_ms, read_back_ms },
+        })
+    }
+}
+
+impl Backend for AshBackend {
+    fn describe(&self) -> &Description {
+        &self.description
+    }
+
+    fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
+        let (size, limit) = (plan.size(), self.description.capabilities.max_image);
+        if size.max_element() > limit {
+            return Err(RenderError::ImageTooLarge { size, limit });
+        }
+        if plan.visible.is_empty() || size.min_element() == 0 {
+            return Ok(Frame { image: Picture::transparent(size), timing: Timing::default() });
+        }
+        self.replay(plan)
+    }
+
+    fn evaluate(
+        &mut self,
+        plan: &FramePlan,
+        function: ShaderFunction,
+        inputs: &[[f32; 4]],
+    ) -> Result<Vec<[f32; 4]>, RenderError> {
+        match inputs.is_empty() {
+            true => Ok(Vec::new()),
+            false => self.evaluate_all(plan, function, inputs),
+        }
+    }
+}
+
+fn describe(device: &PhysicalDevice) -> Description {
+    let limits = &device.limits;
+    Description {
+        backend: "ash",
+        adapter: device.summary.name.clone(),
+        driver: device.summary.driver.clone(),
+        capabilities: Capabilities {
+            max_texture_3d: limits.max_image_dimension3_d,
+            max_image: limits.max_image_dimension2_d,
+            max_buffer_bytes: u64::from(limits.max_storage_buffer_range),
+            sub_texel_bits: limits.sub_texel_precision_bits,
+        },
+    }
+}

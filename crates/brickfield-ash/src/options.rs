@@ -1,0 +1,129 @@
+//! Which adapter to use, and how.
+
+use std::fmt;
+
+use crate::ConnectError;
+use crate::vulkan::{Instance, physical_devices};
+
+/// How to connect.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Which adapter.
+    pub adapter: AdapterChoice,
+    /// Whether Vulkan's validation layer watches.
+    pub validation: Validation,
+}
+
+/// Which adapter to use.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum AdapterChoice {
+    /// The first discrete GPU; without one the first integrated, virtual, software adapter.
+    #[default]
+    Default,
+    /// The adapter of this [`AdapterSummary::index`].
+    Index(usize),
+    /// The first adapter whose name contains this, in any case.
+    Name(String),
+}
+
+/// Whether Vulkan's validation layer watches every call, synchronisation included. Slow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Validation {
+    /// No.
+    #[default]
+    Off,
+    /// Yes; what it says is kept in a [`ValidationLog`](crate::ValidationLog).
+    On,
+}
+
+/// An adapter, as its driver describes it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AdapterSummary {
+    /// Its place in [`adapters`].
+    pub index: usize,
+    /// Its name.
+    pub name: String,
+    /// The driver's name and version.
+    pub driver: String,
+    /// What it is.
+    pub kind: AdapterKind,
+}
+
+/// What an adapter is; the best comes first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum AdapterKind {
+    /// A graphics card.
+    Discrete,
+    /// A GPU that shares the processor's memory.
+    Integrated,
+    /// A GPU lent by a host.
+    Virtual,
+    /// A driver that renders on the processor.
+    Cpu,
+    /// None of these.
+    Other,
+}
+
+impl fmt::Display for AdapterSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {} ({})", self.index, self.name, self.driver)
+    }
+}
+
+/// The Vulkan adapters of this machine.
+///
+/// # Errors
+/// If there is no Vulkan loader, or the loader fails. A machine without a driver has an empty list.
+pub fn adapters() -> Result<Vec<AdapterSummary>, ConnectError> {
+    let instance = match Instance::new(Validation::Off) {
+        Err(ConnectError::NoDevice) => return Ok(Vec::new()),
+        instance => instance?,
+    };
+    Ok(physical_devices(&instance)?.into_iter().map(|d| d.summary).collect())
+}
+
+/// The place in the list of the adapter that `choice` means.
+pub(crate) fn choose(choice: &AdapterChoice, there: &[AdapterSummary]) -> Result<usize, ConnectError> {
+    if there.is_empty() {
+        return Err(ConnectError::NoDevice);
+    }
+    let (found, wanted) = match choice {
+        AdapterChoice::Default => (there.iter().min_by_key(|a| a.kind), String::new()),
+        AdapterChoice::Index(index) => (there.get(*index), format!("{index}")),
+        AdapterChoice::Name(part) => {
+            let part_lower = part.to_lowercase();
+            (there.iter().find(|a| a.name.to_lowercase().contains(&part_lower)), format!("`{part}`"))
+        }
+    };
+    let listed = || there.iter().map(AdapterSummary::to_string).collect::<Vec<_>>().join(", ");
+    found.map(|a| a.index).ok_or_else(|| ConnectError::UnknownAdapter { wanted, there: listed() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn list() -> Vec<AdapterSummary> {
+        [("Soft", AdapterKind::Cpu), ("Inner", AdapterKind::Integrated), ("Big Card", AdapterKind::Discrete)]
+            .into_iter()
+            .enumerate()
+            .map(|(index, (name, kind))| AdapterSummary { index, name: name.into(), driver: "d 1".into(), kind })
+            .collect()
+    }
+
+    #[test]
+    fn the_best_adapter_is_the_default_and_others_are_chosen_by_place_or_name() {
+        assert_eq!(choose(&AdapterChoice::Default, &list()), Ok(2));
+        assert_eq!(choose(&AdapterChoice::Default, &list()[..2]), Ok(1));
+        assert_eq!(choose(&AdapterChoice::Index(0), &list()), Ok(0));
+        assert_eq!(choose(&AdapterChoice::Name("card".into()), &list()), Ok(2));
+    }
+
+    #[test]
+    fn an_unknown_adapter_is_answered_with_those_that_are_there() {
+        let error = choose(&AdapterChoice::Name("nix".into()), &list()).unwrap_err().to_string();
+        assert!(error.contains("`nix`") && error.contains("1: Inner (d 1), 2: Big Card"), "{error}");
+        assert!(choose(&AdapterChoice::Index(3), &list()).is_err());
+        assert_eq!(choose(&AdapterChoice::Default, &[]), Err(ConnectError::NoDevice));
+    }
+}

@@ -1,0 +1,112 @@
+//! Between host and device: buffers in the host's reach, through which everything is copied.
+
+use std::sync::Arc;
+
+use brickfield_frame::RenderError;
+
+use crate::vulkan::{Buffer, Device, HostBuffer, Queue, Residence, Use};
+
+/// Most bytes that are copied at once: a large set of bricks does not need its memory twice.
+pub(crate) const CHUNK_BYTES: usize = 64 << 20;
+
+/// Host buffers for both directions, as large as they had to be, at most a chunk or one row of pixels.
+pub(crate) struct Staging {
+    device: Arc<Device>,
+    upload: Option<HostBuffer>,
+    read_back: Option<HostBuffer>,
+}
+
+/// A part of a buffer's new content, and where it lies on the way.
+struct Piece<'a> {
+    target: &'a Buffer,
+    target_offset: u64,
+    staging_offset: usize,
+    bytes: &'a [u8],
+}
+
+impl Staging {
+    /// No buffers yet.
+    pub(crate) fn new(device: &Arc<Device>) -> Staging {
+        Staging { device: device.clone(), upload: None, read_back: None }
+    }
+
+    /// A buffer of at least `n_bytes` that the host fills.
+    pub(crate) fn upload(&mut self, n_bytes: usize) -> Result<&mut HostBuffer, RenderError> {
+        reserve(&mut self.upload, &self.device, n_bytes, Residence::Upload)
+    }
+
+    /// A buffer of at least `n_bytes` that the device fills.
+    pub(crate) fn read_back(&mut self, n_bytes: usize) -> Result<&mut HostBuffer, RenderError> {
+        reserve(&mut self.read_back, &self.device, n_bytes, Residence::ReadBack)
+    }
+
+    /// Frees a large upload buffer; small ones are kept for the next frame.
+    pub(crate) fn shrink(&mut self) {
+        self.upload.take_if(|b| b.buffer().n_bytes() > (CHUNK_BYTES / 16) as u64);
+    }
+
+    /// Fills buffers on the device from their start, for shaders to read.
+    pub(crate) fn fill(&mut self, queue: &mut Queue, contents: &[(&Buffer, &[u8])]) -> Result<(), RenderError> {
+        for batch in batches(contents, CHUNK_BYTES) {
+            let staging = self.upload(batch.iter().map(|p| p.bytes.len()).sum())?;
+            for piece in &batch {
+                staging.write(piece.staging_offset, piece.bytes);
+            }
+            let from = staging.buffer();
+            queue.run("uploading a frame's data", |recorder| {
+                for piece in &batch {
+                    let (from, to) = ((from, piece.staging_offset as u64), (piece.target, piece.target_offset));
+                    recorder.copy(from, to, piece.bytes.len() as u64);
+                }
+                recorder.barrier(Use::CopyTarget, Use::ShaderRead);
+            })?;
+        }
+        Ok(())
+    }
+
+    /// The first `n_bytes` of a buffer on the device that a shader wrote.
+    pub(crate) fn read(&mut self, queue: &mut Queue, from: &Buffer, n_bytes: usize) -> Result<&[u8], RenderError> {
+        let to = self.read_back(n_bytes)?;
+        let target = to.buffer();
+        queue.run("reading results back", |recorder| {
+            recorder.barrier(Use::ShaderWrite, Use::CopySource);
+            recorder.copy((from, 0), (target, 0), n_bytes as u64);
+            recorder.barrier(Use::CopyTarget, Use::HostRead);
+        })?;
+        Ok(to.read(n_bytes))
+    }
+}
+
+fn reserve<'a>(
+    slot: &'a mut Option<HostBuffer>,
+    device: &Arc<Device>,
+    n_bytes: usize,
+    residence: Residence,
+) -> Result<&'a mut HostBuffer, RenderError> {
+    slot.take_if(|b| b.buffer().n_bytes() < n_bytes as u64);
+    match slot {
+        Some(buffer) => Ok(buffer),
+        None => Ok(slot.insert(HostBuffer::new(device, (n_bytes as u64).next_power_of_two().max(1 << 16), residence)?)),
+    }
+}
+
+/// Cuts contents into batches of at most `capacity` bytes.
+fn batches<'a>(contents: &[(&'a Buffer, &'a [u8])], capacity: usize) -> Vec<Vec<Piece<'a>>> {
+    let mut batches: Vec<Vec<Piece<'a>>> = Vec::new();
+    let mut used = capacity;
+    for &(target, content) in contents {
+        for (i, bytes) in content.chunks(capacity).enumerate() {
+            if used + bytes.len() > capacity {
+                batches.push(Vec::new());
+                used = 0;
+            }
+            let piece = Piece { target, target_offset: (i * capacity) as u64, staging_offset: used, bytes };
+            used += bytes.len();
+            match batches.last_mut() {
+                Some(batch) => batch.push(piece),
+                None => batches.push(vec![piece]),
+            }
+        }
+    }
+    batches
+}

@@ -1,0 +1,124 @@
+//! Images with their views, and the sampler.
+#![expect(unsafe_code, reason = "Vulkan's functions are foreign")]
+
+use std::sync::Arc;
+
+use ash::vk;
+use brickfield_core::glam::{UVec2, UVec3};
+use brickfield_frame::RenderError;
+
+use super::memory::Allocation;
+use super::{Device, Residence};
+use crate::error::{FailedCall, OfCall};
+
+/// The colour aspect of an image without mip levels or layers.
+pub(super) const WHOLE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
+    aspect_mask: vk::ImageAspectFlags::COLOR,
+    base_mip_level: 0,
+    level_count: 1,
+    base_array_layer: 0,
+    layer_count: 1,
+};
+
+/// An image with its view and memory.
+pub(crate) struct Image {
+    pub(super) raw: vk::Image,
+    pub(super) view: vk::ImageView,
+    extent: UVec3,
+    device: Arc<Device>,
+    /// Dropped after the image is destroyed.
+    memory: Option<Allocation>,
+}
+
+impl Image {
+    /// A 3-D texture that copies fill and shaders read.
+    pub(crate) fn texture_3d(device: &Arc<Device>, format: vk::Format, extent: UVec3) -> Result<Image, RenderError> {
+        let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
+        let info = vk::ImageCreateInfo::default().image_type(vk::ImageType::TYPE_3D).format(format).usage(usage);
+        Image::new(device, "the brick atlas", vk::ImageViewType::TYPE_3D, info, extent)
+    }
+
+    /// A picture of four floats a pixel that shaders write and copies read.
+    pub(crate) fn picture(device: &Arc<Device>, size: UVec2) -> Result<Image, RenderError> {
+        let usage = vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::TRANSFER_SRC;
+        let format = vk::Format::R32G32B32A32_SFLOAT;
+        let info = vk::ImageCreateInfo::default().image_type(vk::ImageType::TYPE_2D).format(format).usage(usage);
+        Image::new(device, "the picture", vk::ImageViewType::TYPE_2D, info, size.extend(1))
+    }
+
+    fn new(
+        device: &Arc<Device>,
+        what: &'static str,
+        view_type: vk::ImageViewType,
+        info: vk::ImageCreateInfo<'_>,
+        extent: UVec3,
+    ) -> Result<Image, RenderError> {
+        let info = info.extent(extent_3d(extent)).mip_levels(1).array_layers(1).samples(vk::SampleCountFlags::TYPE_1);
+        // SAFETY: callers keep the extent within the device's limits and the format within its features.
+        let raw = unsafe { device.raw().create_image(&info, None) }.of("vkCreateImage")?;
+        let mut image = Image { raw, view: vk::ImageView::null(), extent, device: device.clone(), memory: None };
+        // SAFETY: the image is new.
+        let required = unsafe { device.raw().get_image_memory_requirements(raw) };
+        let memory = image.memory.insert(Allocation::new(device, what, required, Residence::Device)?);
+        // SAFETY: the memory is as required, new, and bound once; `image` holds it.
+        unsafe { device.raw().bind_image_memory(raw, memory.raw, 0) }.of("vkBindImageMemory")?;
+        let view = vk::ImageViewCreateInfo::default()
+            .image(raw)
+            .view_type(view_type)
+            .format(info.format)
+            .subresource_range(WHOLE);
+        // SAFETY: the image is bound to memory and of this format and dimension.
+        image.view = unsafe { device.raw().create_image_view(&view, None) }.of("vkCreateImageView")?;
+        Ok(image)
+    }
+
+    /// Its size in texels.
+    pub(crate) fn extent(&self) -> UVec3 {
+        self.extent
+    }
+}
+
+impl Drop for Image {
+    fn drop(&mut self) {
+        // SAFETY: the device is idle, and nothing else names image or view; a null view is allowed.
+        unsafe {
+            self.device.raw().destroy_image_view(self.view, None);
+            self.device.raw().destroy_image(self.raw, None);
+        }
+    }
+}
+
+/// A sampler: linear, clamped to the edge.
+pub(crate) struct Sampler {
+    pub(super) raw: vk::Sampler,
+    device: Arc<Device>,
+}
+
+impl Sampler {
+    /// The sampler of the atlas.
+    pub(crate) fn linear(device: &Arc<Device>) -> Result<Sampler, FailedCall> {
+        let edge = vk::SamplerAddressMode::CLAMP_TO_EDGE;
+        let info = vk::SamplerCreateInfo::default()
+            .mag_filter(vk::Filter::LINEAR)
+            .min_filter(vk::Filter::LINEAR)
+            .mipmap_mode(vk::SamplerMipmapMode::NEAREST)
+            .address_mode_u(edge)
+            .address_mode_v(edge)
+            .address_mode_w(edge);
+        // SAFETY: a plain description without optional features.
+        let raw = unsafe { device.raw().create_sampler(&info, None) }.of("vkCreateSampler")?;
+        Ok(Sampler { raw, device: device.clone() })
+    }
+}
+
+impl Drop for Sampler {
+    fn drop(&mut self) {
+        // SAFETY: the device is idle, and nothing else names the sampler.
+        unsafe { self.device.raw().destroy_sampler(self.raw, None) };
+    }
+}
+
+/// A size as Vulkan takes it.
+pub(super) fn extent_3d(UVec3 { x, y, z }: UVec3) -> vk::Extent3D {
+    vk::Extent3D { width: x, height: y, depth: z }
+}

@@ -1,0 +1,160 @@
+//! What can be recorded into a command buffer.
+#![expect(unsafe_code, reason = "Vulkan's functions are foreign")]
+
+use std::marker::PhantomData;
+
+use ash::vk;
+use brickfield_core::glam::UVec3;
+
+use super::image::{WHOLE, extent_3d};
+use super::{BoundPipeline, Buffer, HostBuffer, Image};
+
+/// Records commands; what they name is borrowed for `'a`.
+pub(crate) struct Recorder<'q, 'a> {
+    device: &'q ash::Device,
+    commands: vk::CommandBuffer,
+    recorded: PhantomData<fn(&'a ()) -> &'a ()>,
+}
+
+/// How a resource is used before or after a barrier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Use {
+    /// Not at all: an image's content is undefined.
+    Nothing,
+    /// A copy or clear writes it.
+    CopyTarget,
+    /// A copy reads it.
+    CopySource,
+    /// A shader reads it.
+    ShaderRead,
+    /// A shader writes it, and perhaps reads it.
+    ShaderWrite,
+    /// The host reads it.
+    HostRead,
+}
+
+/// A box of an image, and where its texels lie in a buffer: x fastest, without gaps.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ImageBox {
+    pub(crate) buffer_offset: u64,
+    pub(crate) origin: UVec3,
+    pub(crate) extent: UVec3,
+}
+
+impl<'q, 'a> Recorder<'q, 'a> {
+    pub(super) fn new(device: &'q ash::Device, commands: vk::CommandBuffer) -> Recorder<'q, 'a> {
+        Recorder { device, commands, recorded: PhantomData }
+    }
+
+    /// All that was done before with `before` ends, and is seen by `after`.
+    pub(crate) fn barrier(&mut self, before: Use, after: Use) {
+        let ((from_stage, from), (to_stage, to)) = (before.scope(), after.scope());
+        let barrier = vk::MemoryBarrier::default().src_access_mask(from).dst_access_mask(to);
+        let none = vk::DependencyFlags::empty();
+        // SAFETY: stages and accesses belong together (`Use::scope`).
+        unsafe { self.device.cmd_pipeline_barrier(self.commands, from_stage, to_stage, none, &[barrier], &[], &[]) };
+    }
+
+    /// As [`barrier`](Self::barrier) for an image, which changes its layout.
+    pub(crate) fn image_barrier(&mut self, image: &'a Image, before: Use, after: Use) {
+        let ((from_stage, from), (to_stage, to)) = (before.scope(), after.scope());
+        let barrier = vk::ImageMemoryBarrier::default()
+            .image(image.raw)
+            .subresource_range(WHOLE)
+            .src_access_mask(from)
+            .dst_access_mask(to)
+            .old_layout(before.layout())
+            .new_layout(after.layout())
+            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED);
+        let none = vk::DependencyFlags::empty();
+        // SAFETY: the image outlives the run; stages, accesses and layouts belong together.
+        unsafe { self.device.cmd_pipeline_barrier(self.commands, from_stage, to_stage, none, &[], &[], &[barrier]) };
+    }
+
+    /// Copies bytes between buffers.
+    pub(crate) fn copy(&mut self, from: (&'a Buffer, u64), to: (&'a Buffer, u64), n_bytes: u64) {
+        let inside = |(buffer, offset): (&Buffer, u64)| offset + n_bytes <= buffer.n_bytes();
+        assert!(inside(from) && inside(to), "a copy past the end of a buffer");
+        let region = vk::BufferCopy { src_offset: from.1, dst_offset: to.1, size: n_bytes };
+        // SAFETY: both ranges are inside (asserted), both buffers outlive the run and allow copies.
+        unsafe { self.device.cmd_copy_buffer(self.commands, from.0.raw, to.0.raw, &[region]) };
+    }
+
+    /// Copies texels into an image that is a [`Use::CopyTarget`].
+    pub(crate) fn fill(&mut self, from: &'a HostBuffer, to: &'a Image, texel_bytes: u64, boxes: &[ImageBox]) {
+        let regions = regions(from.buffer(), to, texel_bytes, boxes);
+        let layout = Use::CopyTarget.layout();
+        // SAFETY: the boxes are inside both (asserted by `regions`), buffer and image outlive the run and allow copies.
+        unsafe { self.device.cmd_copy_buffer_to_image(self.commands, from.buffer().raw, to.raw, layout, &regions) };
+    }
+
+    /// Copies texels out of an image that is a [`Use::CopySource`].
+    pub(crate) fn read_back(&mut self, from: &'a Image, to: &'a HostBuffer, texel_bytes: u64, part: ImageBox) {
+        let regions = regions(to.buffer(), from, texel_bytes, &[part]);
+        let layout = Use::CopySource.layout();
+        // SAFETY: as in `fill`.
+        unsafe { self.device.cmd_copy_image_to_buffer(self.commands, from.raw, layout, to.buffer().raw, &regions) };
+    }
+
+    /// Sets all texels of an image that is a [`Use::CopyTarget`] to 0.
+    pub(crate) fn clear(&mut self, image: &'a Image) {
+        let (zero, layout) = (vk::ClearColorValue { float32: [0.0; 4] }, Use::CopyTarget.layout());
+        // SAFETY: the image outlives the run, is a colour image, and allows transfers.
+        unsafe { self.device.cmd_clear_color_image(self.commands, image.raw, layout, &zero, &[WHOLE]) };
+    }
+
+    /// Runs `n` workgroups along x, y, z, from workgroup `first`.
+    pub(crate) fn dispatch(&mut self, bound: &'a BoundPipeline<'a>, first: [u32; 3], n: [u32; 3]) {
+        let (pipeline, compute) = (bound.pipeline, vk::PipelineBindPoint::COMPUTE);
+        // SAFETY: the pipeline, its set and what is bound outlive the run; the pipeline allows a base; callers keep the
+        // number of workgroups within 65,535, which every device allows.
+        unsafe {
+            self.device.cmd_bind_pipeline(self.commands, compute, pipeline.raw);
+            self.device.cmd_bind_descriptor_sets(self.commands, compute, pipeline.layout, 0, &[pipeline.set], &[]);
+            self.device.cmd_dispatch_base(self.commands, first[0], first[1], first[2], n[0], n[1], n[2]);
+        }
+    }
+}
+
+impl Use {
+    fn scope(self) -> (vk::PipelineStageFlags, vk::AccessFlags) {
+        use vk::{AccessFlags as Access, PipelineStageFlags as Stage};
+        match self {
+            Use::Nothing => (Stage::TOP_OF_PIPE, Access::empty()),
+            Use::CopyTarget => (Stage::TRANSFER, Access::TRANSFER_WRITE),
+            Use::CopySource => (Stage::TRANSFER, Access::TRANSFER_READ),
+            Use::ShaderRead => (Stage::COMPUTE_SHADER, Access::SHADER_READ | Access::UNIFORM_READ),
+            Use::ShaderWrite => (Stage::COMPUTE_SHADER, Access::SHADER_READ | Access::SHADER_WRITE),
+            Use::HostRead => (Stage::HOST, Access::HOST_READ),
+        }
+    }
+
+    fn layout(self) -> vk::ImageLayout {
+        match self {
+            Use::Nothing => vk::ImageLayout::UNDEFINED,
+            Use::CopyTarget => vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+            Use::CopySource => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+            Use::ShaderRead => vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+            Use::ShaderWrite | Use::HostRead => vk::ImageLayout::GENERAL,
+        }
+    }
+}
+
+fn regions(buffer: &Buffer, image: &Image, texel_bytes: u64, boxes: &[ImageBox]) -> Vec<vk::BufferImageCopy> {
+    let region = |b: &ImageBox| {
+        let texels: u64 = b.extent.to_array().into_iter().map(u64::from).product();
+        assert!(b.buffer_offset + texels * texel_bytes <= buffer.n_bytes(), "a copy past the end of a buffer");
+        assert!((b.origin + b.extent).cmple(image.extent()).all(), "a copy past the end of an image");
+        vk::BufferImageCopy::default()
+            .buffer_offset(b.buffer_offset)
+            .image_subresource(vk::ImageSubresourceLayers {
+                aspect_mask: vk::ImageAspectFlags::COLOR,
+                layer_count: 1,
+                ..Default::default()
+            })
+            .image_offset(vk::Offset3D { x: b.origin.x as i32, y: b.origin.y as i32, z: b.origin.z as i32 })
+            .image_extent(extent_3d(b.extent))
+    };
+    boxes.iter().map(region).collect()
+}

@@ -1,0 +1,21 @@
+//! The backend on whatever Vulkan device there is; without one each test says `no device` and passes.
+
+mod functions;
+mod pictures;
+mod plans;
+mod refusals;
+mod validation;
+
+use brickfield_ash::{AshBackend, ConnectError, Options, Validation};
+
+/// A backend, if this machine has one.
+fn connect(validation: Validation) -> Option<AshBackend> {
+    match AshBackend::new(&Options { validation, ..Options::default() }) {
+        Ok(backend) => Some(backend),
+        Err(e @ (ConnectError::NoLoader { .. } | ConnectError::NoDevice | ConnectError::NoValidationLayer)) => {
+            println!("no device: {e}");
+            None
+        }
+        Err(e) => panic!("{e}"),
+    }
+}

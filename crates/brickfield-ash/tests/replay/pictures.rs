@@ -1,0 +1,92 @@
+//! Pictures against closed forms.
+
+use brickfield_ash::Validation;
+use brickfield_core::{Aabb, Image, TransferFunction, glam::DVec3};
+use brickfield_frame::{Backend, Feature, FeatureSet, FramePlan, Mode, QuadratureRule, SampleFormat};
+
+use crate::connect;
+use crate::plans::{bumps, nothing, plan, ramp, rising};
+
+const FORMATS: [SampleFormat; 3] = [SampleFormat::Unorm8, SampleFormat::Unorm16, SampleFormat::Float32];
+const FAST: Mode = Mode::Fast { transmittance_floor: 0.0 };
+
+fn assert_close(image: &Image<f32>, expected: [f64; 4], tolerance: f64, what: &str) {
+    for pixel in image.pixels() {
+        for (got, expected) in pixel.iter().zip(expected) {
+            assert!((f64::from(*got) - expected).abs() <= tolerance, "{what}: {pixel:?}, expected {expected}");
+        }
+    }
+}
+
+fn layer(depth: f64, color: [f64; 3]) -> [f64; 4] {
+    let alpha = -(-depth).exp_m1();
+    [color[0] * alpha, color[1] * alpha, color[2] * alpha, alpha]
+}
+
+#[test]
+fn a_homogeneous_slab_has_its_closed_form_in_every_rule() {
+    let Some(mut backend) = connect(Validation::Off) else { return };
+    let transfer = TransferFunction::constant(0.07, [0.2, 0.4, 0.8]).unwrap();
+    for rule in QuadratureRule::ALL.into_iter().filter(|r| *r != QuadratureRule::LeftRiemann) {
+        let mut plan = plan(ramp(SampleFormat::Unorm8), transfer.clone(), rule, Mode::Exact);
+        for features in [plan.features, FeatureSet::all().without(Feature::HardwareFilter)] {
+            plan.features = features;
+            let frame = backend.render(&plan).unwrap();
+            assert_close(&frame.image, layer(0.07 * 16.0, [0.2, 0.4, 0.8]), 1e-6, rule.name());
+        }
+    }
+}
+
+#[test]
+fn a_ramp_has_its_closed_form_in_every_format_and_mode() {
+    let Some(mut backend) = connect(Validation::Off) else { return };
+    // The field is 0 for half a voxel, z for fifteen, 15 for half a voxel.
+    let expected = layer(0.01 * (112.5 + 7.5), [1.0, 0.5, 0.25]);
+    for format in FORMATS {
+        for (mode, tolerance) in [(Mode::Exact, 1e-6), (FAST, 1e-2)] {
+            for rule in [QuadratureRule::MidpointExponential, QuadratureRule::PreIntegrated] {
+                let frame = backend.render(&plan(ramp(format), rising(0.01), rule, mode)).unwrap();
+                let color_tolerance = 0.05; // colours are classified too: looser
+                let alpha = frame.image.map(|c| c);
+                for pixel in alpha.pixels() {
+                    assert!((f64::from(pixel[3]) - expected[3]).abs() <= tolerance, "{format:?} {mode:?}: {pixel:?}");
+                }
+                assert_close(&frame.image, expected, color_tolerance, "colour");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_frame_without_anything_visible_is_transparent() {
+    let Some(mut backend) = connect(Validation::Off) else { return };
+    let full = plan(bumps(SampleFormat::Unorm8), rising(0.1), QuadratureRule::MidpointExponential, FAST);
+    let transparent = Image::transparent(full.size());
+    assert_eq!(backend.render(&nothing(&full)).unwrap().image, transparent);
+    let invisible = FramePlan { visible: Aabb { min: DVec3::ZERO, max: DVec3::ZERO }, ..nothing(&full) };
+    assert_eq!(backend.render(&invisible).unwrap().image, transparent);
+    assert_ne!(backend.render(&full).unwrap().image, transparent);
+}
+
+#[test]
+fn a_replay_is_the_same_to_the_bit() {
+    let Some(mut backend) = connect(Validation::Off) else { return };
+    for mode in [Mode::Exact, FAST] {
+        let plan = plan(bumps(SampleFormat::Unorm16), rising(0.02), QuadratureRule::Gauss2, mode);
+        let first = backend.render(&plan).unwrap();
+        let again = backend.render(&plan).unwrap();
+        assert_eq!(first.image, again.image);
+        assert!(first.timing.device_ms.is_none_or(|ms| ms > 0.0) && first.timing.wall_ms > 0.0);
+    }
+}
+
+#[test]
+fn a_picture_in_many_submits_is_the_same_to_the_bit() {
+    let Some(mut backend) = connect(Validation::Off) else { return };
+    let plan = plan(bumps(SampleFormat::Unorm16), rising(0.02), QuadratureRule::MidpointExponential, Mode::Exact);
+    let whole = backend.render(&plan).unwrap();
+    // By such a box a ray has 10^8 segments, and a row of workgroups is a submit of its own.
+    let visible = Aabb { min: DVec3::splat(-1e8), max: DVec3::splat(1e8) };
+    let bands = backend.render(&FramePlan { visible, ..plan }).unwrap();
+    assert_eq!(whole.image, bands.image);
+}

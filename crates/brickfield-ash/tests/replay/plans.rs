@@ -1,0 +1,99 @@
+//! Small plans, built by hand.
+
+use std::sync::Arc;
+
+use brickfield_core::glam::{DVec3, UVec2, UVec3};
+use brickfield_core::{BrickSide, Camera, Grid, Knot, Level, Projection, TransferFunction};
+use brickfield_frame::{
+    BrickSet, Decode, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, QuadratureRule, RayFrame,
+    SampleFormat, Sampling,
+};
+
+const N: u32 = 16;
+
+/// Two bricks side by side along x: 31 x 16 x 16 samples whose value is their z.
+pub(crate) fn ramp(format: SampleFormat) -> BrickSet {
+    filled(format, |_, p| p.z)
+}
+
+/// The same with values that vary along all axes and from brick to brick, all of them 0 to 15.
+pub(crate) fn bumps(format: SampleFormat) -> BrickSet {
+    filled(format, |slot, p| {
+        let x = p.x + slot * (N - 1);
+        (x * 7 + p.y * 5 + p.z * 3 + x * p.y / 4) % N
+    })
+}
+
+fn filled(format: SampleFormat, value: impl Fn(u32, UVec3) -> u32) -> BrickSet {
+    let (decode, per_value) = match format {
+        SampleFormat::Unorm8 => (Decode { scale: 255.0 / 16.0, offset: 0.0 }, 16),
+        SampleFormat::Unorm16 => (Decode { scale: 65535.0 / 4096.0, offset: 0.0 }, 4096),
+        SampleFormat::Float32 => (Decode { scale: 1.0, offset: 0.0 }, 1),
+    };
+    let mut bytes = Vec::new();
+    for i in 0..2 * N.pow(3) {
+        let (slot, i) = (i / N.pow(3), i % N.pow(3));
+        let stored = value(slot, UVec3::new(i % N, i / N % N, i / (N * N))) * per_value;
+        match format {
+            SampleFormat::Float32 => bytes.extend((stored as f32).to_le_bytes()),
+            _ => bytes.extend(&stored.to_le_bytes()[..format.n_bytes()]),
+        }
+    }
+    BrickSet::new(BrickSide::S16, format, decode, bytes).unwrap()
+}
+
+/// Extinction 0 at value 0, rising by `slope` per unit of value up to 16.
+pub(crate) fn rising(slope: f64) -> TransferFunction {
+    let knot = |value: f64| Knot { value, extinction: value * slope, color: [1.0, 0.5, 0.25] };
+    TransferFunction::new(vec![knot(0.0), knot(16.0)]).unwrap()
+}
+
+/// A picture of the two bricks along z: all rays cross 16 voxels of 1 world unit.
+pub(crate) fn plan(bricks: BrickSet, transfer: TransferFunction, rule: QuadratureRule, mode: Mode) -> FramePlan {
+    let dims = UVec3::new(2 * N - 1, N, N);
+    let grid = Grid::axis_aligned(dims, DVec3::ONE).unwrap();
+    let target = grid.world_box().center();
+    let projection = Projection::Orthographic { height: 12.0 };
+    let camera = Camera::look_at(target - DVec3::Z * 20.5, target, -DVec3::Y, projection).unwrap();
+    let domain = brickfield_core::Aabb { min: DVec3::splat(-0.5), max: dims.as_dvec3() - 0.5 };
+    let sampling = Sampling::new(0.5, rule, mode).unwrap();
+    let mut index = IndexGrid::transparent(UVec3::new(2, 1, 1));
+    for slot in 0..2 {
+        index.fill(UVec3::new(slot, 0, 0), IndexEntry::Resident { slot, level: Level(0) });
+    }
+    let features = features(&transfer, mode);
+    FramePlan {
+        dims,
+        rays: RayFrame::new(&camera, &grid, UVec2::new(20, 12), &domain, sampling.step_world()),
+        domain,
+        visible: domain,
+        sampling,
+        transfer,
+        index,
+        bricks: Arc::new(bricks),
+        features,
+    }
+}
+
+/// The same with nothing in it.
+pub(crate) fn nothing(plan: &FramePlan) -> FramePlan {
+    let bricks = &plan.bricks;
+    let empty = BrickSet::new(bricks.side(), bricks.format(), bricks.decode(), Vec::new()).unwrap();
+    FramePlan {
+        index: IndexGrid::transparent(plan.index.dims()),
+        bricks: Arc::new(empty),
+        features: plan.features.with(Feature::SkipTransparent),
+        ..plan.clone()
+    }
+}
+
+fn features(transfer: &TransferFunction, mode: Mode) -> FeatureSet {
+    let mut features = FeatureSet::default();
+    if transfer.knots().len() > 1 {
+        features = features.with(Feature::TransferLookup);
+    }
+    match mode {
+        Mode::Exact => features,
+        Mode::Fast { .. } => features.with(Feature::HardwareFilter).with(Feature::EarlyTermination),
+    }
+}

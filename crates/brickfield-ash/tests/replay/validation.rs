@@ -1,0 +1,42 @@
+//! The validation layer, synchronisation included, has nothing to say.
+
+use brickfield_ash::{AshBackend, Validation};
+use brickfield_core::{TransferFunction, glam::UVec2};
+use brickfield_frame::{Backend, FramePlan, Mode, QuadratureRule, SampleFormat, ShaderFunction};
+
+use crate::connect;
+use crate::plans::{bumps, nothing, plan, ramp, rising};
+
+const FAST: Mode = Mode::Fast { transmittance_floor: 1e-3 };
+
+#[test]
+fn the_layer_is_silent_from_the_first_call_to_the_last() {
+    let Some(mut backend) = connect(Validation::On) else { return };
+    for format in [SampleFormat::Unorm8, SampleFormat::Unorm16, SampleFormat::Float32] {
+        for mode in [Mode::Exact, FAST] {
+            exercise(&mut backend, &plan(bumps(format), rising(0.05), QuadratureRule::MidpointExponential, mode));
+        }
+    }
+    for rule in QuadratureRule::ALL {
+        exercise(&mut backend, &plan(ramp(SampleFormat::Unorm8), rising(0.05), rule, Mode::Exact));
+    }
+    let constant = TransferFunction::constant(0.1, [1.0; 3]).unwrap();
+    exercise(&mut backend, &plan(ramp(SampleFormat::Unorm8), constant, QuadratureRule::Gauss2, FAST));
+    let log = backend.validation_log();
+    assert_eq!(backend.validation_messages(), Vec::<String>::new());
+    drop(backend);
+    assert_eq!(log.drain(), Vec::<String>::new());
+}
+
+fn exercise(backend: &mut AshBackend, plan: &FramePlan) {
+    let render = |backend: &mut AshBackend, plan: &FramePlan| backend.render(plan).unwrap();
+    render(backend, plan);
+    render(backend, plan);
+    let mut wide = plan.clone();
+    wide.rays.size = UVec2::new(70, 30);
+    render(backend, &wide);
+    render(backend, &nothing(plan));
+    for function in ShaderFunction::ALL {
+        backend.evaluate(plan, function, &[[0.5; 4]; 100]).unwrap();
+    }
+}
