@@ -57,7 +57,7 @@ impl Camera {
         check_projection(projection)?;
         let forward = (target - eye).try_normalize().ok_or(CameraError::NoDirection { eye })?;
         let right = forward.cross(up.normalize_or_zero());
-        if !(right.length() > 1e-9) {
+        if right.length() <= 1e-9 {
             return Err(CameraError::Up { up, forward });
         }
         let right = right.normalize();

@@ -65,7 +65,7 @@ impl Grid {
             direction.z_axis.normalize_or_zero(),
         );
         let determinant = unit.determinant();
-        if !(determinant.abs() > 1e-6) {
+        if determinant.is_nan() || determinant.abs() <= 1e-6 {
             return Err(GridError::Direction { direction, determinant });
         }
         let linear = unit * DMat3::from_diagonal(spacing);

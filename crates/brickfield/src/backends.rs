@@ -131,6 +131,55 @@ fn open_cpu(adapter: Option<&str>) -> Result<Box<dyn Backend>, BackendError> {
     }
 }
 
+#[cfg(feature = "wgpu")]
+fn wgpu_adapters() -> Result<Vec<AdapterInfo>, String> {
+    let list = brickfield_wgpu::adapters().into_iter();
+    let list: Vec<_> = list.map(|a| AdapterInfo { index: a.index, name: a.name, driver: a.driver }).collect();
+    if list.is_empty() { Err(brickfield_wgpu::OpenError::NoAdapter.to_string()) } else { Ok(list) }
+}
+
+#[cfg(feature = "wgpu")]
+fn open_wgpu(adapter: Option<&str>, _: Validation) -> Result<Box<dyn Backend>, BackendError> {
+    use brickfield_wgpu::{AdapterChoice, WgpuBackend};
+    let choice = choose(adapter, AdapterChoice::Default, AdapterChoice::Index, AdapterChoice::Name);
+    let backend = WgpuBackend::new(&choice).map_err(|e| unavailable(BackendKind::Wgpu, &e))?;
+    Ok(Box::new(backend))
+}
+
+#[cfg(feature = "ash")]
+fn ash_adapters() -> Result<Vec<AdapterInfo>, String> {
+    let list = brickfield_ash::adapters().map_err(|e| e.to_string())?.into_iter();
+    let list: Vec<_> = list.map(|a| AdapterInfo { index: a.index, name: a.name, driver: a.driver }).collect();
+    if list.is_empty() { Err(brickfield_ash::ConnectError::NoDevice.to_string()) } else { Ok(list) }
+}
+
+#[cfg(feature = "ash")]
+fn open_ash(adapter: Option<&str>, validation: Validation) -> Result<Box<dyn Backend>, BackendError> {
+    use brickfield_ash::{AdapterChoice, AshBackend, Options};
+    let adapter = choose(adapter, AdapterChoice::Default, AdapterChoice::Index, AdapterChoice::Name);
+    let validation = match validation {
+        Validation::Off => brickfield_ash::Validation::Off,
+        Validation::On => brickfield_ash::Validation::On,
+    };
+    let options = Options { adapter, validation };
+    let backend = AshBackend::new(&options).map_err(|e| unavailable(BackendKind::Ash, &e))?;
+    Ok(Box::new(backend))
+}
+
+/// What `--adapter` means to a backend: nothing, a number, or a part of a name.
+#[cfg(any(feature = "wgpu", feature = "ash"))]
+fn choose<C>(adapter: Option<&str>, default: C, index: fn(usize) -> C, name: fn(String) -> C) -> C {
+    match adapter {
+        None => default,
+        Some(text) => text.parse().map_or_else(|_| name(text.to_owned()), index),
+    }
+}
+
+#[cfg(any(feature = "wgpu", feature = "ash"))]
+fn unavailable(kind: BackendKind, error: &dyn std::error::Error) -> BackendError {
+    BackendError::Unavailable { kind, reason: error.to_string() }
+}
+
 #[cfg(not(feature = "wgpu"))]
 fn wgpu_adapters() -> Result<Vec<AdapterInfo>, String> {
     Err(BackendError::NotBuilt { kind: BackendKind::Wgpu }.to_string())
