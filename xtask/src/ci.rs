@@ -75,7 +75,7 @@ fn readme_steps() -> Result<Vec<Step>> {
         let words: Vec<String> = ["cargo", "xtask", name].map(str::to_owned).to_vec();
         let shown = commands.contains(&words);
         step(&format!("README: cargo xtask {name}"), move || {
-            anyhow::ensure!(shown, "README.md shows no command `cargo xtask {name}` in a ```sh block");
+            anyhow::ensure!(shown, "README.md shows no command `cargo xtask {name}` in a code block");
             xtask(&[name]).run()
         })
     });

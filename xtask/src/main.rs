@@ -11,7 +11,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
-use spawn::{Tool, cargo};
+use spawn::{Spawn, Tool, cargo};
 
 /// The project's commands
 ///
@@ -26,10 +26,10 @@ struct Options {
 
 const ENVIRONMENT: &str = "\
 Environment:
-  BRICKFIELD_DATA           folder of volumes that tests and comparisons use; without it they use made-up volumes
-                            (with CI=true, ../shared/data where that exists)
-  BRICKFIELD_XTASK_PROFILE  `release` (default) or `dev`: how compare, conformance and orders are built.
-                            dev shares all its dependencies with `cargo xtask test`: CI compiles wgpu once";
+  BRICKFIELD_DATA: folder of real volumes for tests and comparisons. Without it they use
+    made-up ones (with CI=true: those in ../shared/data, where that exists).
+  BRICKFIELD_XTASK_PROFILE: `release` (default) or `dev`, how compare, conformance and
+    orders are built. dev shares its dependencies with `test`: CI compiles wgpu once.";
 
 #[derive(Subcommand)]
 enum Command {
@@ -70,15 +70,31 @@ struct Passed {
     arguments: Vec<String>,
 }
 
+impl Passed {
+    /// The arguments as they were typed: clap drops the first `--`, which is cargo's.
+    fn typed(self) -> Vec<String> {
+        let n_dropped = usize::from(std::env::args_os().len() > 2 + self.arguments.len());
+        let typed = std::env::args_os().skip(2).map(|a| a.to_string_lossy().into_owned());
+        if n_dropped == 0 { self.arguments } else { typed.collect() }
+    }
+}
+
 fn main() -> Result<ExitCode> {
     match Options::parse().command {
         Command::Setup { yes } => setup::setup(if yes { setup::Consent::Given } else { setup::Consent::Ask }),
-        Command::Compare(passed) => Tool::Compare.run(&passed.arguments),
-        Command::Test(passed) => cargo("test").arg("--workspace").args(&passed.arguments).run(),
-        Command::Conformance(passed) => Tool::Conformance.run(&passed.arguments),
-        Command::Orders(passed) => Tool::Orders.run(&passed.arguments),
-        Command::Bench(passed) => cargo("bench").args(["--workspace", "--benches"]).args(&passed.arguments).run(),
+        Command::Compare(passed) => Tool::Compare.run(&passed.typed()),
+        Command::Test(passed) => of_packages(cargo("test"), &passed.typed()),
+        Command::Conformance(passed) => Tool::Conformance.run(&passed.typed()),
+        Command::Orders(passed) => Tool::Orders.run(&passed.typed()),
+        Command::Bench(passed) => of_packages(cargo("bench").arg("--benches"), &passed.typed()),
         Command::Layers => layers::layers(),
         Command::Ci => ci::ci(),
     }
+}
+
+/// Runs a cargo command on the packages that the arguments name, or else on all.
+fn of_packages(command: Spawn, arguments: &[String]) -> Result<ExitCode> {
+    let names_one = |a: &String| a.starts_with("-p") || a.starts_with("--package") || a.starts_with("--manifest-path");
+    let all: &[&str] = if arguments.iter().take_while(|a| *a != "--").any(names_one) { &[] } else { &["--workspace"] };
+    command.args(all).args(arguments).run()
 }

@@ -164,7 +164,7 @@ const CT_SOFT_TISSUE: [Point; 6] = [
     (80.0, 0.03, 0xc05038),
     (160.0, 0.15, 0xe88860),
     (300.0, 0.35, 0xf4d8b0),
-    (1200.0, 1.0, 0xfffaf0),
+    (1200.0, 0.6, 0xfffaf0),
 ];
 const CT_LUNG: [Point; 7] = [
     (-970.0, 0.0, 0x102848),
@@ -179,8 +179,8 @@ const CT_SKIN: [Point; 4] =
     [(-450.0, 0.0, 0x502818), (-250.0, 0.15, 0xb07858), (0.0, 0.8, 0xe8b898), (300.0, 1.5, 0xf8e0cc)];
 const MR_DEFAULT: [Point; 5] =
     [(0.1, 0.0, 0x301c18), (0.25, 1.5, 0x80483c), (0.5, 12.0, 0xc88c70), (0.75, 40.0, 0xf0d8c0), (1.0, 80.0, 0xffffff)];
-const RAMP: [Point; 2] = [(0.02, 0.0, 0xffffff), (1.0, FULL, 0xffffff)];
-const GRAY: [Point; 2] = [(0.02, 0.0, 0x000000), (1.0, FULL, 0xffffff)];
+const RAMP: [Point; 2] = [(0.05, 0.0, 0xffffff), (1.0, 20.0, 0xffffff)];
+const GRAY: [Point; 2] = [(0.05, 0.0, 0x000000), (1.0, FULL, 0xffffff)];
 
 /// Nine equidistant colours of a map, the first transparent, extinction rising with the square of the value: what is
 /// rare and high shows through what is common and low.
@@ -240,8 +240,8 @@ mod tests {
 
     #[test]
     fn relative_presets_follow_range_and_length() {
-        let tf = Preset::Ramp.transfer(RANGE, 30.0).unwrap();
-        assert_eq!((tf.at(80.0).extinction, tf.at(-18.0).extinction), (2.0, 0.0));
+        let tf = Preset::Ramp.transfer(RANGE, 10.0).unwrap();
+        assert_eq!((tf.at(80.0).extinction, tf.at(-15.0).extinction), (2.0, 0.0));
         assert!(Preset::Ramp.transfer(RANGE, 0.0).is_err());
         assert!(Preset::Gray.transfer(ValueRange { min: f64::MIN, max: f64::MAX }, 1.0).is_err());
     }
