@@ -7,7 +7,7 @@ use brickfield_core::glam::UVec3;
 use brickfield_frame::{AtlasShape, BrickSet, RenderError, SampleFormat};
 
 use crate::staging::{CHUNK_BYTES, Staging};
-use crate::vulkan::{Device, Image, ImageBox, Queue, Use};
+use crate::vulkan::{Device, Image, ImageBox, Queue, Use, vulkan_format};
 
 /// A set of bricks on the device.
 ///
@@ -37,7 +37,7 @@ impl Atlas {
         set: &Arc<BrickSet>,
         shape: AtlasShape,
     ) -> Result<Atlas, RenderError> {
-        let image = Image::texture_3d(device, vulkan_format(set.format()), shape.texels())?;
+        let image = Image::texture_3d(device, set.format(), shape.texels())?;
         queue.run("preparing the brick atlas", |recorder| {
             recorder.image_barrier(&image, Use::Nothing, Use::CopyTarget);
             if shape.bricks.element_product() > set.n_bricks() {
@@ -71,10 +71,14 @@ pub(crate) fn check_format(
     format: SampleFormat,
     needed: vk::FormatFeatureFlags,
 ) -> Result<(), RenderError> {
-    let what = match format {
-        SampleFormat::Unorm8 => "sample (or filter, in fast mode) 8-bit normalised textures",
-        SampleFormat::Unorm16 => "sample (or filter, in fast mode) 16-bit normalised textures",
-        SampleFormat::Float32 => "sample (or filter, in fast mode) 32-bit float textures",
+    let filtered = needed.contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR);
+    let what = match (format, filtered) {
+        (SampleFormat::Unorm8, false) => "read textures of 8-bit samples",
+        (SampleFormat::Unorm8, true) => "filter textures of 8-bit samples, as fast mode does",
+        (SampleFormat::Unorm16, false) => "read textures of 16-bit samples",
+        (SampleFormat::Unorm16, true) => "filter textures of 16-bit samples, as fast mode does",
+        (SampleFormat::Float32, false) => "read textures of 32-bit floats",
+        (SampleFormat::Float32, true) => "filter textures of 32-bit floats, as fast mode does",
     };
     match device.format_features(vulkan_format(format)).contains(needed) {
         true => Ok(()),
@@ -105,12 +109,4 @@ fn chunk_boxes(set: &BrickSet, shape: AtlasShape, first_slot: u32, bytes: &[u8])
         extent: UVec3::splat(set.side().n_samples()),
     };
     (0..n).map(at).collect()
-}
-
-fn vulkan_format(format: SampleFormat) -> vk::Format {
-    match format {
-        SampleFormat::Unorm8 => vk::Format::R8_UNORM,
-        SampleFormat::Unorm16 => vk::Format::R16_UNORM,
-        SampleFormat::Float32 => vk::Format::R32_SFLOAT,
-    }
 }

@@ -107,7 +107,7 @@ impl Backend for AshBackend {
         if size.max_element() > limit {
             return Err(RenderError::ImageTooLarge { size, limit });
         }
-        if plan.visible.is_empty() || size.min_element() == 0 {
+        if plan.visible.is_empty() || plan.domain.is_empty() || size.min_element() == 0 {
             return Ok(Frame { image: Picture::transparent(size), timing: Timing::default() });
         }
         self.replay(plan)

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use ash::vk;
 use brickfield_frame::RenderError;
 
-use super::memory::Allocation;
+use super::memory::{Allocation, refused};
 use super::{Device, Residence};
 use crate::error::OfCall;
 
@@ -41,7 +41,8 @@ impl Buffer {
     ) -> Result<Buffer, RenderError> {
         let info = vk::BufferCreateInfo::default().size(n_bytes).usage(usage);
         // SAFETY: a plain description; the size is above 0, as callers ask for at least one element.
-        let raw = unsafe { device.raw().create_buffer(&info, None) }.of("vkCreateBuffer")?;
+        let raw = unsafe { device.raw().create_buffer(&info, None) }
+            .map_err(|code| refused("vkCreateBuffer", code, what, n_bytes, None))?;
         let mut buffer = Buffer { raw, n_bytes, device: device.clone(), memory: None };
         // SAFETY: the buffer is new.
         let required = unsafe { device.raw().get_buffer_memory_requirements(raw) };

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use ash::vk;
 use brickfield_core::glam::{UVec2, UVec3};
-use brickfield_frame::RenderError;
+use brickfield_frame::{RenderError, SampleFormat};
 
-use super::memory::Allocation;
+use super::memory::{Allocation, refused};
 use super::{Device, Residence};
 use crate::error::{FailedCall, OfCall};
 
@@ -32,10 +32,12 @@ pub(crate) struct Image {
 
 impl Image {
     /// A 3-D texture that copies fill and shaders read.
-    pub(crate) fn texture_3d(device: &Arc<Device>, format: vk::Format, extent: UVec3) -> Result<Image, RenderError> {
+    pub(crate) fn texture_3d(device: &Arc<Device>, format: SampleFormat, extent: UVec3) -> Result<Image, RenderError> {
+        let n_bytes = format.n_bytes() as u64 * n_texels(extent);
+        let format = vulkan_format(format);
         let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
         let info = vk::ImageCreateInfo::default().image_type(vk::ImageType::TYPE_3D).format(format).usage(usage);
-        Image::new(device, "the brick atlas", vk::ImageViewType::TYPE_3D, info, extent)
+        Image::new(device, ("the brick atlas", n_bytes), vk::ImageViewType::TYPE_3D, info, extent)
     }
 
     /// A picture of four floats a pixel that shaders write and copies read.
@@ -43,19 +45,21 @@ impl Image {
         let usage = vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::TRANSFER_SRC;
         let format = vk::Format::R32G32B32A32_SFLOAT;
         let info = vk::ImageCreateInfo::default().image_type(vk::ImageType::TYPE_2D).format(format).usage(usage);
-        Image::new(device, "the picture", vk::ImageViewType::TYPE_2D, info, size.extend(1))
+        let extent = size.extend(1);
+        Image::new(device, ("the picture", 16 * n_texels(extent)), vk::ImageViewType::TYPE_2D, info, extent)
     }
 
     fn new(
         device: &Arc<Device>,
-        what: &'static str,
+        (what, n_bytes): (&'static str, u64),
         view_type: vk::ImageViewType,
         info: vk::ImageCreateInfo<'_>,
         extent: UVec3,
     ) -> Result<Image, RenderError> {
         let info = info.extent(extent_3d(extent)).mip_levels(1).array_layers(1).samples(vk::SampleCountFlags::TYPE_1);
         // SAFETY: callers keep the extent within the device's limits and the format within its features.
-        let raw = unsafe { device.raw().create_image(&info, None) }.of("vkCreateImage")?;
+        let raw = unsafe { device.raw().create_image(&info, None) }
+            .map_err(|code| refused("vkCreateImage", code, what, n_bytes, None))?;
         let mut image = Image { raw, view: vk::ImageView::null(), extent, device: device.clone(), memory: None };
         // SAFETY: the image is new.
         let required = unsafe { device.raw().get_image_memory_requirements(raw) };
@@ -121,4 +125,39 @@ impl Drop for Sampler {
 /// A size as Vulkan takes it.
 pub(super) fn extent_3d(UVec3 { x, y, z }: UVec3) -> vk::Extent3D {
     vk::Extent3D { width: x, height: y, depth: z }
+}
+
+/// The format of an atlas.
+pub(crate) fn vulkan_format(format: SampleFormat) -> vk::Format {
+    match format {
+        SampleFormat::Unorm8 => vk::Format::R8_UNORM,
+        SampleFormat::Unorm16 => vk::Format::R16_UNORM,
+        SampleFormat::Float32 => vk::Format::R32_SFLOAT,
+    }
+}
+
+fn n_texels(extent: UVec3) -> u64 {
+    extent.to_array().into_iter().map(u64::from).product()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Instance, physical_devices};
+    use super::*;
+    use crate::Validation;
+
+    #[test]
+    fn a_texture_that_no_device_holds_is_refused_with_its_size() {
+        let Ok(instance) = Instance::new(Validation::Off) else { return println!("no device") };
+        let Some(physical) = physical_devices(&instance).unwrap().pop() else { return println!("no device") };
+        let limit = physical.limits.max_image_dimension3_d;
+        let device = Device::new(instance, physical).unwrap();
+        let least = 4 * u64::from(limit).pow(3);
+        match Image::texture_3d(&device, SampleFormat::Float32, UVec3::splat(limit)).map(|_| ()) {
+            Err(RenderError::OutOfMemory { n_bytes, .. } | RenderError::BufferTooLarge { n_bytes, .. }) => {
+                assert!(n_bytes >= least, "{n_bytes} of {least}");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
 }

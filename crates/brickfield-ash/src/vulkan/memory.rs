@@ -60,8 +60,8 @@ impl Allocation {
         }
         let info = vk::MemoryAllocateInfo::default().allocation_size(n_bytes).memory_type_index(memory_type as u32);
         // SAFETY: the type is one of the device's, the size within its heap and the device's limit.
-        let raw =
-            unsafe { device.raw().allocate_memory(&info, None) }.map_err(|code| refused(code, what, n_bytes, heap))?;
+        let raw = unsafe { device.raw().allocate_memory(&info, None) }
+            .map_err(|code| refused("vkAllocateMemory", code, what, n_bytes, Some(heap)))?;
         Ok(Allocation { raw, device: device.clone() })
     }
 }
@@ -73,11 +73,18 @@ impl Drop for Allocation {
     }
 }
 
-fn refused(code: vk::Result, what: &'static str, n_bytes: u64, heap: u64) -> RenderError {
+/// The error of a call that was to provide `n_bytes` for `what`.
+pub(super) fn refused(
+    call: &'static str,
+    code: vk::Result,
+    what: &'static str,
+    n_bytes: u64,
+    available: Option<u64>,
+) -> RenderError {
     match code {
-        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => RenderError::OutOfMemory { what, n_bytes, available: Some(heap) },
+        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => RenderError::OutOfMemory { what, n_bytes, available },
         vk::Result::ERROR_OUT_OF_HOST_MEMORY => RenderError::OutOfMemory { what, n_bytes, available: None },
-        code => FailedCall { call: "vkAllocateMemory", code }.into(),
+        code => FailedCall { call, code }.into(),
     }
 }
 

@@ -19,3 +19,9 @@ fn connect(validation: Validation) -> Option<AshBackend> {
         Err(e) => panic!("{e}"),
     }
 }
+
+#[test]
+fn a_backend_may_move_to_another_thread() {
+    fn check<T: Send>() {}
+    check::<AshBackend>();
+}

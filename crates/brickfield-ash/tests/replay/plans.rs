@@ -11,7 +11,8 @@ use brickfield_frame::{
 
 const N: u32 = 16;
 
-/// Two bricks side by side along x: 31 x 16 x 16 samples whose value is their z.
+/// Two bricks side by side along x: 31 x 16 x 16 samples whose value is their z. A third brick is nowhere: with it the
+/// atlas has a place that no brick fills.
 pub(crate) fn ramp(format: SampleFormat) -> BrickSet {
     filled(format, |_, p| p.z)
 }
@@ -31,7 +32,7 @@ fn filled(format: SampleFormat, value: impl Fn(u32, UVec3) -> u32) -> BrickSet {
         SampleFormat::Float32 => (Decode { scale: 1.0, offset: 0.0 }, 1),
     };
     let mut bytes = Vec::new();
-    for i in 0..2 * N.pow(3) {
+    for i in 0..3 * N.pow(3) {
         let (slot, i) = (i / N.pow(3), i % N.pow(3));
         let stored = value(slot, UVec3::new(i % N, i / N % N, i / (N * N))) * per_value;
         match format {
