@@ -143,7 +143,7 @@ fn trilinear(volume: &Volume, q: DVec3) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn brute_force_comes_to_the_same(

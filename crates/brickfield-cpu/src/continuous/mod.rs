@@ -114,7 +114,7 @@ pub fn continuous_ray(
 ) -> RayIntegral {
     let domain = volume_box(volume).intersection(clip);
     let square = ray.direction.length_squared();
-    if domain.is_empty() || !(square > 0.0) {
+    if domain.is_empty() || square.is_nan() || square <= 0.0 {
         return RayIntegral::default();
     }
     // Parameters count from the point nearest to the domain's centre: an origin far away costs no digits.

@@ -24,6 +24,9 @@ impl Part {
 
 /// Where a ray with parameter at least `least` runs in the half-open box `b` (relative to the frame's centre).
 pub(super) fn clip(ray: &PlanRay, b: &Aabb, least: f64) -> Option<Span> {
+    if b.is_empty() {
+        return None;
+    }
     let mut span = Span { start: least - ray.t_anchor, end: f64::INFINITY };
     for axis in 0..3 {
         let (o, d) = (ray.anchor[axis], ray.direction[axis]);
@@ -67,5 +70,6 @@ mod tests {
         assert_eq!(clip(&ray(-1.0), &b, 5.5), Some(Span { start: 5.5, end: 6.0 }));
         assert_eq!(clip(&ray(1.0), &b, 0.0), None);
         assert_eq!(clip(&ray(0.0), &b, 6.0), None);
+        assert_eq!(clip(&ray(0.0), &Aabb { min: b.max, max: b.min }, 0.0), None);
     }
 }

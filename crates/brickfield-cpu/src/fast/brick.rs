@@ -1,8 +1,14 @@
-//! Samples of one brick in f32.
+//! Samples of one brick in f32: several nodes of a ray at a time, so that the compiler can use vector registers.
 //!
-//! Brick sides are powers of two, so that an index masked with n^3 - 1 is in range by construction: no bounds check is left.
+//! Brick sides are powers of two: an index masked with n^3 - 1 is in range by construction, and no bounds check is left.
 
 use brickfield_frame::SampleFormat;
+
+/// Nodes that are interpolated together.
+pub(super) const LANES: usize = 16;
+
+/// One number for each node of a batch.
+pub(super) type Lanes = [f32; LANES];
 
 /// How a sample is read from the bytes of a brick.
 pub(super) trait Stored: Copy + Send + Sync + 'static {
@@ -10,11 +16,12 @@ pub(super) trait Stored: Copy + Send + Sync + 'static {
     const N_BYTES: usize;
     /// The format.
     const FORMAT: SampleFormat;
-    /// Taken off stored numbers before they are interpolated: 16 bits leave f32 only 8 bits for fractions, so numbers are
-    /// counted from the one that stands for the transfer function's first knot.
-    const IS_WIDE: bool = false;
-    /// The stored number of sample `i`.
-    fn read(bytes: &[u8], i: usize) -> f32;
+    /// Two samples that are neighbours along x, as they are stored.
+    type Pair: Copy + Default;
+    /// Samples `i` and `i + 1`, reading nothing behind the brick's `n` samples; `n` is a power of two.
+    fn pair(bytes: &[u8], i: usize, n: usize) -> Self::Pair;
+    /// The stored numbers of a pair, less `bias`.
+    fn split(pair: Self::Pair, bias: f32) -> (f32, f32);
 }
 
 #[derive(Clone, Copy)]
@@ -27,40 +34,114 @@ pub(super) struct Float32;
 impl Stored for Unorm8 {
     const N_BYTES: usize = 1;
     const FORMAT: SampleFormat = SampleFormat::Unorm8;
+    type Pair = u32;
     #[inline(always)]
-    fn read(bytes: &[u8], i: usize) -> f32 {
-        f32::from(bytes[i])
+    fn pair(bytes: &[u8], i: usize, n: usize) -> u32 {
+        u32::from(bytes[i & (n - 1)]) | u32::from(bytes[(i + 1) & (n - 1)]) << 16
+    }
+    #[inline(always)]
+    fn split(pair: u32, _: f32) -> (f32, f32) {
+        ((pair & 0xffff) as i32 as f32, (pair >> 16) as i32 as f32)
     }
 }
 
 impl Stored for Unorm16 {
     const N_BYTES: usize = 2;
     const FORMAT: SampleFormat = SampleFormat::Unorm16;
+    type Pair = u32;
     #[inline(always)]
-    fn read(bytes: &[u8], i: usize) -> f32 {
-        f32::from(u16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]]))
+    fn pair(bytes: &[u8], i: usize, n: usize) -> u32 {
+        let at = |i: usize| u32::from(u16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]]));
+        at(i & (n - 1)) | at((i + 1) & (n - 1)) << 16
+    }
+    /// 16 bits leave f32 only 8 bits for fractions: numbers are counted from the one that stands for the first knot.
+    #[inline(always)]
+    fn split(pair: u32, bias: f32) -> (f32, f32) {
+        ((pair & 0xffff) as i32 as f32 - bias, (pair >> 16) as i32 as f32 - bias)
     }
 }
 
 impl Stored for Float32 {
     const N_BYTES: usize = 4;
     const FORMAT: SampleFormat = SampleFormat::Float32;
+    type Pair = [f32; 2];
     #[inline(always)]
-    fn read(bytes: &[u8], i: usize) -> f32 {
-        f32::from_le_bytes([bytes[4 * i], bytes[4 * i + 1], bytes[4 * i + 2], bytes[4 * i + 3]])
+    fn pair(bytes: &[u8], i: usize, n: usize) -> [f32; 2] {
+        let at = |i: usize| f32::from_le_bytes([bytes[4 * i], bytes[4 * i + 1], bytes[4 * i + 2], bytes[4 * i + 3]]);
+        [at(i & (n - 1)), at((i + 1) & (n - 1))]
+    }
+    #[inline(always)]
+    fn split(pair: [f32; 2], _: f32) -> (f32, f32) {
+        (pair[0], pair[1])
     }
 }
 
-/// The stored number at `s` in [0, n - 1] of a brick of n^3 samples: linear along x, then y, then z.
+/// Adding this to a number between -2^22 and 2^22 rounds it to an integer, which the sum's low bits then hold.
+const ROUND: f32 = 12_582_912.0;
+
+/// Evenly spaced nodes in a brick: positions in its own samples, [0, n - 1] once clamped to `last`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nodes {
+    pub(super) origin: [f32; 3],
+    /// Change from node to node.
+    pub(super) change: [f32; 3],
+    pub(super) last: [f32; 3],
+    /// Taken off stored numbers (only 16-bit ones).
+    pub(super) bias: f32,
+}
+
+impl Nodes {
+    /// The stored numbers (less the bias) at `first`, `first` + 1, ...: linear along x, then y, then z.
+    #[inline(always)]
+    pub(super) fn stored<const N: usize, S: Stored>(&self, brick: &[u8], first: f32) -> Lanes {
+        let brick = &brick[..N * N * N * S::N_BYTES];
+        let (mut base, mut fraction) = ([0u32; LANES], [[0f32; LANES]; 3]);
+        for axis in 0..3 {
+            let (origin, change, last) =
+                (self.origin[axis] + self.change[axis] * first, self.change[axis], self.last[axis]);
+            let stride = N.pow(axis as u32) as u32;
+            for l in 0..LANES {
+                let s = at_least(at_most(origin + change * l as f32, last), 0.0);
+                // Below or at s: where s is an integer, either cell has its value.
+                let rounded = (s - 0.5) + ROUND;
+                fraction[axis][l] = s - (rounded - ROUND);
+                base[l] += (rounded.to_bits() & (N as u32 - 1)) * stride;
+            }
+        }
+        let mut pairs = [[S::Pair::default(); LANES]; 4];
+        for l in 0..LANES {
+            let i = base[l] as usize;
+            for (pair, corner) in pairs.iter_mut().zip([0, N, N * N, N * N + N]) {
+                pair[l] = S::pair(brick, i + corner, N * N * N);
+            }
+        }
+        let [fx, fy, fz] = &fraction;
+        let mut out = [0f32; LANES];
+        for l in 0..LANES {
+            let row = |p: &[S::Pair; LANES]| {
+                let (a, b) = S::split(p[l], self.bias);
+                mix(a, b, fx[l])
+            };
+            let near = mix(row(&pairs[0]), row(&pairs[1]), fy[l]);
+            let far = mix(row(&pairs[2]), row(&pairs[3]), fy[l]);
+            out[l] = mix(near, far, fz[l]);
+        }
+        out
+    }
+}
+
 #[inline(always)]
-pub(super) fn trilinear<const N: usize, S: Stored>(brick: &[u8], s: [f32; 3]) -> f32 {
-    // Truncation is floor: s is not negative.
-    let i = s.map(|x| (x as i32 as u32 as usize).min(N - 2));
-    let f = [s[0] - i[0] as f32, s[1] - i[1] as f32, s[2] - i[2] as f32];
-    let base = i[0] + N * (i[1] + N * i[2]);
-    let v = |c: usize| S::read(brick, (base + c) & (N * N * N - 1));
-    let mix = |a: f32, b: f32, f: f32| a + (b - a) * f;
-    let row = |c: usize| mix(v(c), v(c + 1), f[0]);
-    let slice = |c: usize| mix(row(c), row(c + N), f[1]);
-    mix(slice(0), slice(N * N), f[2])
+fn mix(a: f32, b: f32, f: f32) -> f32 {
+    a + (b - a) * f
+}
+
+/// `f32::max` without its care for NaN: one instruction.
+#[inline(always)]
+fn at_least(x: f32, low: f32) -> f32 {
+    if x > low { x } else { low }
+}
+
+#[inline(always)]
+fn at_most(x: f32, high: f32) -> f32 {
+    if x < high { x } else { high }
 }

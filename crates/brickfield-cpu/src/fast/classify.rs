@@ -76,9 +76,17 @@ impl Classifier {
     #[inline(always)]
     pub(super) fn on(&self, i: usize, value: f32) -> Optics32 {
         let s = &self.stretches[i];
-        let f = ((value - s.start) * s.reciprocal).clamp(0.0, 1.0);
+        let f = (value - s.start) * s.reciprocal;
+        let f = if f > 0.0 { f } else { 0.0 };
+        let f = if f < 1.0 { f } else { 1.0 };
         let mix = |c: usize| s.low[c] * (1.0 - f) + s.high[c] * f;
         Optics32 { extinction: mix(3), color: [mix(0), mix(1), mix(2)] }
+    }
+
+    /// Whether nothing of stretch `i` is visible.
+    #[inline(always)]
+    pub(super) fn is_dark(&self, i: usize) -> bool {
+        self.stretches[i].low[3] + self.stretches[i].high[3] == 0.0
     }
 
     /// The value at the lower end of stretch `i`, which is not the first.

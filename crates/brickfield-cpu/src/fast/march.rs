@@ -4,7 +4,8 @@ use brickfield_core::Span;
 use brickfield_core::glam::DVec3;
 use brickfield_frame::{IndexEntry, PlanRay};
 
-use super::brick::{Stored, trilinear};
+use super::batch;
+use super::brick::{LANES, Nodes, Stored};
 use super::scene::{Block, Scene};
 use super::segment::{Ray32, Segment32, segment};
 
@@ -92,14 +93,14 @@ fn run<const N: usize, S: Stored>(
     let n = ((exit / path.step - far).ceil() - k as f64).min((to.min(path.end - 1) - k) as f64) as i64;
     if let (IndexEntry::Resident { slot, level }, true) = (block.entry, n > 0) {
         let scale = 1.0 / f64::from(level.stride());
-        let inner = Inner {
-            brick: scene.brick(slot),
-            origin: (scene.center + path.ray.at(t) - block.corner) * scale,
-            change: path.ray.direction * (path.step * scale),
-            last: ((scene.last - block.corner) * scale).min(DVec3::splat((N - 1) as f64)),
-            far: far - near,
+        let array = |v: DVec3| v.as_vec3().to_array();
+        let nodes = Nodes {
+            origin: array((scene.center + path.ray.at(t) - block.corner) * scale),
+            change: array(path.ray.direction * (path.step * scale)),
+            last: array(((scene.last - block.corner) * scale).min(DVec3::splat((N - 1) as f64))),
+            bias: scene.bias,
         };
-        inner.march(scene, n, state);
+        Inner { brick: scene.brick(slot), nodes, far: (far - near) as f32 }.march(scene, 0, n, state);
     }
     n
 }
@@ -118,32 +119,31 @@ fn exit<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRay, block: &B
     exit + ray.t_anchor
 }
 
-/// A run of segments inside one brick; positions are the brick's own.
+/// A run of segments inside one brick.
 struct Inner<'a> {
     brick: &'a [u8],
-    /// Position of the first node, and its change per segment.
-    origin: DVec3,
-    change: DVec3,
-    last: DVec3,
+    /// The segments' first nodes.
+    nodes: Nodes,
     /// Distance between the rule's nodes, in segments.
-    far: f64,
+    far: f32,
 }
 
 impl Inner<'_> {
-    fn march<const N: usize, S: Stored>(&self, scene: &Scene<N, S>, n: i64, state: &mut Ray32) {
+    /// Puts segments `from..to` behind what has been seen so far.
+    #[inline(always)]
+    fn march<const N: usize, S: Stored>(&self, scene: &Scene<N, S>, from: i64, to: i64, state: &mut Ray32) {
         let sampling = &scene.plan.sampling;
         let (rule, length, floor) = (sampling.rule(), sampling.step_world() as f32, sampling.transmittance_floor());
-        let (origin, change) = (self.origin.as_vec3().to_array(), self.change.as_vec3().to_array());
-        let last = self.last.as_vec3().to_array();
-        let value = |x: f32| {
-            let at = |a: usize| (origin[a] + change[a] * x).max(0.0).min(last[a]);
-            scene.decoded(trilinear::<N, S>(self.brick, [at(0), at(1), at(2)]))
-        };
-        let two_nodes = rule.nodes().len() == 2;
-        for j in 0..n {
-            let x = j as f32;
-            let second = if two_nodes { Some(value(x + self.far as f32)) } else { None };
-            state.push(segment(rule, &scene.transfer, [Some(value(x)), second], length));
+        for first in (from..to).step_by(LANES) {
+            let n = ((to - first) as usize).min(LANES);
+            let near = scene.values(&self.nodes, self.brick, first as f32);
+            match rule.nodes().len() {
+                1 => batch::one_node(rule, &scene.transfer, &near[..n], length, state),
+                _ => {
+                    let far = scene.values(&self.nodes, self.brick, first as f32 + self.far);
+                    batch::two_nodes(rule, &scene.transfer, (&near[..n], &far[..n]), length, state);
+                }
+            }
             if state.transmittance < floor {
                 return;
             }

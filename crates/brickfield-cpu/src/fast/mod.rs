@@ -1,5 +1,6 @@
 //! The fast f32 renderer: a backend that needs no driver.
 
+mod batch;
 mod brick;
 mod classify;
 mod march;

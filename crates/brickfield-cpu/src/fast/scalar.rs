@@ -5,12 +5,15 @@
 /// Relative error below 3e-7.
 #[inline(always)]
 pub(super) fn alpha(depth: f32) -> f32 {
-    if depth < 0.25 { alpha_thin(depth) } else { 1.0 - (-depth).exp() }
+    if depth < THIN { alpha_thin(depth) } else { 1.0 - (-depth).exp() }
 }
+
+/// Depths below this have their opacity from a polynomial.
+pub(super) const THIN: f32 = 0.25;
 
 /// Taylor's polynomial of degree 7; the first term left out is depth^8 / 40320.
 #[inline(always)]
-fn alpha_thin(d: f32) -> f32 {
+pub(super) fn alpha_thin(d: f32) -> f32 {
     const C: [f32; 6] = [-1.0 / 2.0, 1.0 / 6.0, -1.0 / 24.0, 1.0 / 120.0, -1.0 / 720.0, 1.0 / 5040.0];
     d + d * d * (C[0] + d * (C[1] + d * (C[2] + d * (C[3] + d * (C[4] + d * C[5])))))
 }

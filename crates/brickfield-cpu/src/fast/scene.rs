@@ -1,9 +1,9 @@
 //! A plan, ready to be marched through: the field and the transfer function in f32.
 
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_frame::{FramePlan, IndexEntry};
+use brickfield_frame::{FramePlan, IndexEntry, SampleFormat};
 
-use super::brick::{Stored, trilinear};
+use super::brick::{Lanes, Nodes, Stored};
 use super::classify::Classifier;
 
 /// A plan whose bricks have N samples a side, stored as `S`.
@@ -13,9 +13,11 @@ pub(super) struct Scene<'a, const N: usize, S> {
     /// Adds up to a position in sample space from one relative to the frame's centre.
     pub(super) center: DVec3,
     pub(super) last: DVec3,
-    /// From a stored number to a value relative to the first knot.
+    /// From a stored number, less the bias, to a value relative to the first knot.
     pub(super) gain: f32,
     pub(super) offset: f32,
+    /// The stored number nearest to the first knot; 0 but for 16-bit ones.
+    pub(super) bias: f32,
     stored: std::marker::PhantomData<S>,
 }
 
@@ -34,12 +36,18 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
     pub(super) fn new(plan: &'a FramePlan) -> Self {
         let transfer = Classifier::new(&plan.transfer);
         let decode = plan.bricks.decode();
+        let gain = decode.scale / S::FORMAT.unit();
+        let bias = match S::FORMAT {
+            SampleFormat::Unorm16 => ((transfer.origin - decode.offset) / gain).round().clamp(0.0, 65535.0),
+            SampleFormat::Unorm8 | SampleFormat::Float32 => 0.0,
+        };
         Scene {
             plan,
             center: plan.rays.center,
             last: plan.last_sample(),
-            gain: (decode.scale / S::FORMAT.unit()) as f32,
-            offset: (decode.offset - transfer.origin) as f32,
+            gain: gain as f32,
+            offset: (bias * gain + decode.offset - transfer.origin) as f32,
+            bias: bias as f32,
             transfer,
             stored: std::marker::PhantomData,
         }
@@ -71,14 +79,15 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
         let block = self.block(q);
         let IndexEntry::Resident { slot, level } = block.entry else { return None };
         let s = (q.clamp(DVec3::ZERO, self.last) - block.corner) / f64::from(level.stride());
-        let s = s.clamp(DVec3::ZERO, DVec3::splat((N - 1) as f64)).as_vec3();
-        Some(self.decoded(trilinear::<N, S>(self.brick(slot), s.to_array())))
+        let nodes =
+            Nodes { origin: s.as_vec3().to_array(), change: [0.0; 3], last: [(N - 1) as f32; 3], bias: self.bias };
+        Some(self.values(&nodes, self.brick(slot), 0.0)[0])
     }
 
-    /// A stored number as a value relative to the first knot.
+    /// The values at nodes `first`, `first` + 1, ..., relative to the first knot.
     #[inline(always)]
-    pub(super) fn decoded(&self, stored: f32) -> f32 {
-        stored * self.gain + self.offset
+    pub(super) fn values(&self, nodes: &Nodes, brick: &[u8], first: f32) -> Lanes {
+        nodes.stored::<N, S>(brick, first).map(|stored| stored * self.gain + self.offset)
     }
 
     /// The bytes of the brick in a slot.

@@ -17,7 +17,7 @@ pub(super) struct Segment32 {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ray32 {
     pub(super) transmittance: f64,
-    rgba: [f64; 4],
+    pub(super) rgba: [f64; 4],
 }
 
 impl Default for Ray32 {
