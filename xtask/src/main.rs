@@ -16,7 +16,7 @@ use spawn::{Spawn, Tool, cargo};
 /// The project's commands
 ///
 /// Start with `cargo xtask setup` on a new machine, then `cargo xtask compare`. Exit codes: 0 good, 1 something failed or
-/// is missing, 2 bad arguments; compare, conformance, orders, test and bench pass on what the program that they run says.
+/// is missing, 2 bad arguments; compare, conformance, orders, speed, test and bench pass on what the program that they run says.
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", after_help = ENVIRONMENT)]
 struct Options {
@@ -28,8 +28,8 @@ const ENVIRONMENT: &str = "\
 Environment:
   BRICKFIELD_DATA: folder of real volumes for tests and comparisons. Without it they use
     made-up ones (with CI=true: those in ../shared/data, where that exists).
-  BRICKFIELD_XTASK_PROFILE: `release` (default) or `dev`, how compare, conformance and
-    orders are built. dev shares its dependencies with `test`: CI compiles wgpu once.";
+  BRICKFIELD_XTASK_PROFILE: `release` (default) or `dev`, how compare, conformance, orders
+    and speed are built. dev shares its dependencies with `test`: CI compiles wgpu once.";
 
 #[derive(Subcommand)]
 enum Command {
@@ -54,6 +54,8 @@ enum Command {
     Conformance(Passed),
     /// Measure the order of accuracy of every quadrature rule
     Orders(Passed),
+    /// Measure what skipping saves, the CPU path against the GPU paths, an empty frame, the octree's build rate
+    Speed(Passed),
     /// Run the benchmarks; arguments go to cargo bench
     Bench(Passed),
     /// Hold the workspace to the arrows and the crate table of ARCHITECTURE.md
@@ -86,6 +88,7 @@ fn main() -> Result<ExitCode> {
         Command::Test(passed) => of_packages(cargo("test"), &passed.typed()),
         Command::Conformance(passed) => Tool::Conformance.run(&passed.typed()),
         Command::Orders(passed) => Tool::Orders.run(&passed.typed()),
+        Command::Speed(passed) => Tool::Speed.run(&passed.typed()),
         Command::Bench(passed) => of_packages(cargo("bench").arg("--benches"), &passed.typed()),
         Command::Layers => layers::layers(),
         Command::Ci => ci::ci(),

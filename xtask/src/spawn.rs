@@ -16,6 +16,7 @@ pub(crate) enum Tool {
     Compare,
     Conformance,
     Orders,
+    Speed,
 }
 
 /// How the tools are built.
@@ -92,6 +93,7 @@ impl Tool {
             Tool::Compare => "compare",
             Tool::Conformance => "conformance",
             Tool::Orders => "orders",
+            Tool::Speed => "speed",
         }
     }
 
