@@ -45,7 +45,7 @@ pub(crate) fn read_detached(
 
 fn samples_per_file(names: &FileNames, n_promised: u128) -> Result<u128, ReadError> {
     let n_files = names.n_files();
-    if n_files == 0 || n_promised % n_files != 0 {
+    if n_files == 0 || !n_promised.is_multiple_of(n_files) {
         let expected = format!("a divisor of the {n_promised} samples, above 0");
         return Err(ReadError::field("number of data files", n_files, expected));
     }

@@ -64,9 +64,15 @@ pub enum ReadError {
     #[error("the {what} decoder gave up on this file (it panicked)")]
     DecoderPanicked { what: &'static str },
     #[error("{0}")]
-    Grid(#[from] GridError),
+    Grid(Box<GridError>),
     #[error("{0}")]
     Volume(#[from] VolumeError),
+}
+
+impl From<GridError> for ReadError {
+    fn from(fault: GridError) -> ReadError {
+        ReadError::Grid(Box::new(fault))
+    }
 }
 
 impl ReadError {

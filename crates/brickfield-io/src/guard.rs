@@ -5,9 +5,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use crate::ReadError;
 
 /// Runs a decoder; a panic in it becomes [`ReadError::DecoderPanicked`]. Whatever it was working on is dropped.
-pub(crate) fn guarded<T>(
-    what: &'static str,
-    decode: impl FnOnce() -> Result<T, ReadError>,
-) -> Result<T, ReadError> {
+pub(crate) fn guarded<T>(what: &'static str, decode: impl FnOnce() -> Result<T, ReadError>) -> Result<T, ReadError> {
     catch_unwind(AssertUnwindSafe(decode)).unwrap_or(Err(ReadError::DecoderPanicked { what }))
 }

@@ -39,13 +39,13 @@ pub fn read(
     let header = read_header(&mut stream)?;
     match &header.magic {
         b"n+1\0" => {
-            let skip = data_offset(&header)? - HEADER_BYTES as u64;
-            read_image(&header, stream, skip, limits)
+            let at = Position { n_read: HEADER_BYTES as u64, offset: data_offset(&header)? };
+            read_image(&header, stream, at, limits)
         }
         _ => {
             let mut image = open_image(stem, files)?;
-            let skip = header_offset(&header)?;
-            read_image(&header, Stream::new(&mut *image)?, skip, limits)
+            let at = Position { n_read: 0, offset: header_offset(&header)? };
+            read_image(&header, Stream::new(&mut *image)?, at, limits)
         }
     }
 }
@@ -123,7 +123,13 @@ fn data_offset(header: &NiftiHeader) -> Result<u64, ReadError> {
     }
 }
 
-fn read_image(header: &NiftiHeader, mut stream: Stream, skip: u64, limits: &Limits) -> Result<Opened, ReadError> {
+/// Where the samples begin, and how much has been read before.
+struct Position {
+    n_read: u64,
+    offset: u64,
+}
+
+fn read_image(header: &NiftiHeader, mut stream: Stream, at: Position, limits: &Limits) -> Result<Opened, ReadError> {
     let mut found = Found::plain(Format::Nifti);
     let (dims, n_all) = dims(header, &mut found.notes)?;
     let stored = scalar(header)?;
@@ -134,9 +140,10 @@ fn read_image(header: &NiftiHeader, mut stream: Stream, skip: u64, limits: &Limi
     }
     let (placement, frame) = placement(header, &mut found.notes);
     let grid = placement.grid(shape.dims)?;
-    stream.check_can_hold(u128::from(skip) + n_all.saturating_mul(stored.n_bytes() as u128))?;
-    check_bytes(u128::from(skip), limits, || "the space before vox_offset".to_owned())?;
-    io::copy(&mut (&mut stream.reader).take(skip), &mut io::sink()).map_err(|e| ReadError::io("the file", e))?;
+    stream.check_can_hold(u128::from(at.offset) + n_all.saturating_mul(stored.n_bytes() as u128))?;
+    check_bytes(u128::from(at.offset), limits, || "the space before vox_offset".to_owned())?;
+    io::copy(&mut (&mut stream.reader).take(at.offset - at.n_read), &mut io::sink())
+        .map_err(|e| ReadError::io("the file", e))?;
     let mut voxels = allocate(&shape)?;
     append_binary(&mut voxels, &mut stream.reader, shape.n_voxels(), order(header), "the image")?;
     if stream.is_gzip && n_all == shape.n_voxels() as u128 {

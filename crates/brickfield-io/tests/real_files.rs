@@ -46,7 +46,11 @@ fn files_are_what_the_manifest_says() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-fn check(folder: &Path, manifest: &[Value], (name, path, scalar, slope): &(&str, &str, &str, f64)) -> Result<(), String> {
+fn check(
+    folder: &Path,
+    manifest: &[Value],
+    (name, path, scalar, slope): &(&str, &str, &str, f64),
+) -> Result<(), String> {
     let entry = manifest.iter().find(|e| e["name"] == *name).ok_or(format!("{name}: not in the manifest"))?;
     let opened = open(&folder.join(path), &Limits::default()).map_err(|e| e.to_string())?;
     println!("{name}: {}", summary(&opened));

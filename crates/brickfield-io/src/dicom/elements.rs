@@ -20,6 +20,8 @@ pub(super) enum Syntax {
 
 const UNDEFINED: u32 = u32::MAX;
 const ITEM: (u16, u16) = (0xfffe, 0xe000);
+const ITEM_END: (u16, u16) = (0xfffe, 0xe00d);
+const SEQUENCE_END: (u16, u16) = (0xfffe, 0xe0dd);
 const PIXEL_DATA: (u16, u16) = (0x7fe0, 0x0010);
 
 /// One element's header.
@@ -29,32 +31,70 @@ struct Header {
     is_sequence: bool,
 }
 
-/// Checks from the current position to the end of the pixel data that no element is longer than the source.
-///
-/// Sequences and items are entered, so elements at every depth are seen.
+/// Deeper sequences than this are refused: the parser descends into them on the stack.
+const MAX_DEPTH: usize = 32;
+
+/// Checks from the current position to the end of the pixel data that no element is longer than the source, and that
+/// sequences are not nested without end.
 pub(super) fn check_lengths(source: &mut dyn ByteSource, syntax: Syntax) -> Result<(), ReadError> {
     let mut n_left = n_bytes_left(source)?;
+    let mut nest = Nest { ends: Vec::new() };
     let mut in_pixel_items = false;
-    while let Some((header, n_header_bytes)) = read_header(source, syntax)? {
+    loop {
+        nest.leave_ended(n_left);
+        let Some((header, n_header_bytes)) = read_header(source, syntax)? else { return Ok(()) };
         n_left = n_left.saturating_sub(n_header_bytes);
-        let is_item = header.tag == ITEM;
-        let is_entered = header.is_sequence || header.length == UNDEFINED || (is_item && !in_pixel_items);
-        let is_pixel_data = header.tag == PIXEL_DATA;
+        if header.tag == ITEM_END || header.tag == SEQUENCE_END {
+            nest.leave_delimited();
+            continue;
+        }
         if header.length != UNDEFINED {
             check_element_length(&header, n_left)?;
         }
-        match is_entered {
-            true => in_pixel_items |= is_pixel_data,
-            false => {
-                skip(source, u64::from(header.length))?;
-                n_left -= u64::from(header.length);
-            }
+        let is_pixel_data = header.tag == PIXEL_DATA;
+        let is_item_of_elements = header.tag == ITEM && !in_pixel_items;
+        if header.is_sequence || header.length == UNDEFINED || is_item_of_elements {
+            in_pixel_items |= is_pixel_data;
+            nest.enter(&header, n_left)?;
+            continue;
         }
-        if is_pixel_data && !in_pixel_items {
-            break;
+        skip(source, u64::from(header.length))?;
+        n_left -= u64::from(header.length);
+        if is_pixel_data {
+            return Ok(());
         }
     }
-    Ok(())
+}
+
+/// The sequences and items around an element: how many bytes are left at their ends, or nothing if a delimiter ends
+/// them.
+struct Nest {
+    ends: Vec<Option<u64>>,
+}
+
+impl Nest {
+    fn enter(&mut self, header: &Header, n_left: u64) -> Result<(), ReadError> {
+        let end = (header.length != UNDEFINED).then(|| n_left - u64::from(header.length));
+        self.ends.push(end);
+        match self.ends.len() <= MAX_DEPTH {
+            true => Ok(()),
+            false => Err(ReadError::field("nesting of sequences", self.ends.len(), format!("at most {MAX_DEPTH}"))),
+        }
+    }
+
+    fn leave_ended(&mut self, n_left: u64) {
+        while let Some(Some(end)) = self.ends.last()
+            && n_left <= *end
+        {
+            self.ends.pop();
+        }
+    }
+
+    fn leave_delimited(&mut self) {
+        if let Some(None) = self.ends.last() {
+            self.ends.pop();
+        }
+    }
 }
 
 fn check_element_length(header: &Header, n_left: u64) -> Result<(), ReadError> {
@@ -106,10 +146,7 @@ fn read_header(source: &mut dyn ByteSource, syntax: Syntax) -> Result<Option<(He
 
 /// Value representations whose length has 32 bits (PS3.5, 7.1.2).
 fn has_long_form(vr: [u8; 2]) -> bool {
-    matches!(
-        &vr,
-        b"OB" | b"OD" | b"OF" | b"OL" | b"OV" | b"OW" | b"SQ" | b"SV" | b"UC" | b"UN" | b"UR" | b"UT" | b"UV"
-    )
+    matches!(&vr, b"OB" | b"OD" | b"OF" | b"OL" | b"OV" | b"OW" | b"SQ" | b"SV" | b"UC" | b"UN" | b"UR" | b"UT" | b"UV")
 }
 
 /// Where value representations are implicit, the dictionary tells which elements are sequences.

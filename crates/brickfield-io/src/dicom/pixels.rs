@@ -42,14 +42,18 @@ fn check_fragments(object: &DefaultDicomObject, slice: &Slice) -> Result<(), Rea
         let n_bytes = element.to_bytes().map_or(0, |b| b.len() as u64);
         return check_length(&slice.name, n_bytes, expected_bytes);
     };
-    for size in fragments.iter().filter_map(|f| jpeg_size(f)) {
-        if size != [slice.columns, slice.rows] {
-            let expected = format!("{} x {}, as the data set has it", slice.columns, slice.rows);
-            return Err(ReadError::field("JPEG frame", format!("{} x {}", size[0], size[1]), expected));
-        }
+    if !object.meta().transfer_syntax().starts_with(JPEG_SYNTAXES) {
+        return Ok(());
+    }
+    let size = jpeg_size(&fragments.concat()).ok_or(ReadError::Missing { field: "the JPEG frame header" })?;
+    if size != [slice.columns, slice.rows] {
+        let expected = format!("{} x {}, as the data set has it", slice.columns, slice.rows);
+        return Err(ReadError::field("JPEG frame", format!("{} x {}", size[0], size[1]), expected));
     }
     Ok(())
 }
+
+const JPEG_SYNTAXES: &str = "1.2.840.10008.1.2.4.";
 
 /// Columns and rows of the first frame header, if these bytes are the start of a JPEG.
 fn jpeg_size(bytes: &[u8]) -> Option<[u64; 2]> {

@@ -109,7 +109,9 @@ fn compressor_of(codecs: &Value) -> Result<Compressor, ReadError> {
 impl Shard {
     /// The stored bytes of each part that is there.
     fn parts<'a>(&self, stored: &'a [u8], chunk_shape: &[u64], what: &str) -> Result<Vec<&'a [u8]>, ReadError> {
-        let bad = |field: &str, value: String, expected: String| ReadError::field(format!("{field} of {what}"), value, expected);
+        let bad = |field: &str, value: String, expected: String| {
+            ReadError::field(format!("{field} of {what}"), value, expected)
+        };
         let fits = self.part_shape.len() == chunk_shape.len() && !self.part_shape.contains(&0);
         if !fits {
             let value = format!("{:?}", self.part_shape);
@@ -120,7 +122,11 @@ impl Shard {
         let checksum_bytes = if self.index_has_checksum { 4 } else { 0 };
         let index_bytes = n_parts.saturating_mul(16).saturating_add(checksum_bytes);
         if index_bytes > stored.len() as u128 {
-            return Err(bad("index length", index_bytes.to_string(), format!("at most the {} bytes stored", stored.len())));
+            return Err(bad(
+                "index length",
+                index_bytes.to_string(),
+                format!("at most the {} bytes stored", stored.len()),
+            ));
         }
         let start = if self.is_index_first { 0 } else { stored.len() - index_bytes as usize };
         let index = &stored[start..start + (n_parts * 16) as usize];
@@ -132,7 +138,9 @@ impl Shard {
                 continue;
             }
             let end = offset.checked_add(n_bytes).filter(|end| *end <= stored.len() as u64);
-            let end = end.ok_or_else(|| bad("index entry", format!("{offset} + {n_bytes}"), format!("within {} bytes", stored.len())))?;
+            let end = end.ok_or_else(|| {
+                bad("index entry", format!("{offset} + {n_bytes}"), format!("within {} bytes", stored.len()))
+            })?;
             parts.push(&stored[offset as usize..end as usize]);
         }
         Ok(parts)
@@ -149,7 +157,11 @@ fn check_stream(compressor: Compressor, stored: &[u8], max_bytes: u64, what: &st
     };
     let n_bytes = unpacked.map_err(|e| ReadError::io(what, e))?;
     if n_bytes > max_bytes {
-        return Err(ReadError::TooLarge { what: format!("{what}, unpacked,"), n_bytes: u128::from(n_bytes), max_bytes });
+        return Err(ReadError::TooLarge {
+            what: format!("{what}, unpacked,"),
+            n_bytes: u128::from(n_bytes),
+            max_bytes,
+        });
     }
     Ok(())
 }

@@ -140,6 +140,7 @@ fn find_multiscales(store: &ReadableStorage) -> Result<(String, Vec<Value>), Rea
 
 /// A path must stay in the folder.
 fn check_path(path: &str) -> Result<(), ReadError> {
-    let stays = !path.is_empty() && path.split('/').all(|part| !matches!(part, "" | "." | "..")) && !path.contains('\\');
+    let stays =
+        !path.is_empty() && path.split('/').all(|part| !matches!(part, "" | "." | "..")) && !path.contains('\\');
     if stays { Ok(()) } else { Err(ReadError::field("datasets/path", path, "a path within the folder")) }
 }

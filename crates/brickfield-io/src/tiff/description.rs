@@ -94,7 +94,8 @@ mod tests {
 
     #[test]
     fn ome_orders_pages_as_it_says() {
-        let pixels = r#"<OME><Image><Pixels DimensionOrder="XYCTZ" SizeC="2" SizeT="3" SizeZ="5" PhysicalSizeX="0.25">"#;
+        let pixels =
+            r#"<OME><Image><Pixels DimensionOrder="XYCTZ" SizeC="2" SizeT="3" SizeZ="5" PhysicalSizeX="0.25">"#;
         let description = Description::read(pixels);
         assert_eq!(description.order.map(|o| (o.pages_per_slice, o.n_pages())), Some((6, 30)));
         assert_eq!(description.spacing, [Some(0.25), None, None]);

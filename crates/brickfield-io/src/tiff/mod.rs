@@ -91,7 +91,9 @@ impl Page {
             (SampleFormat::Int, 32) => ScalarType::I32,
             (SampleFormat::IEEEFP, 32) => ScalarType::F32,
             (SampleFormat::IEEEFP, 64) => ScalarType::F64,
-            _ => return Err(ReadError::unsupported("sample type", format!("{format:?} of {bits} bits"), crate::SCALARS)),
+            _ => {
+                return Err(ReadError::unsupported("sample type", format!("{format:?} of {bits} bits"), crate::SCALARS));
+            }
         };
         Ok(Page { width, height, scalar })
     }
@@ -111,11 +113,11 @@ impl Page {
         Ok(())
     }
 
-    /// A decoded page, and room for one strip or tile that reaches beyond it.
+    /// A decoded page (the decoder holds tables of tags to the same limit), and room for strips that reach beyond it.
     fn limits(&self, limits: &Limits) -> TiffLimits {
         let page_bytes = self.n_bytes().min(u128::from(limits.max_bytes)) as usize;
         let mut tiff_limits = header_limits();
-        tiff_limits.decoding_buffer_size = page_bytes;
+        tiff_limits.decoding_buffer_size = page_bytes.max(tiff_limits.ifd_value_size);
         tiff_limits.intermediate_buffer_size = page_bytes.saturating_mul(2).saturating_add(1 << 20);
         tiff_limits
     }

@@ -77,6 +77,9 @@ pub(super) fn read_blocks<'a>(mut words: WordReader<'a>, n_left: u64, shape: &Sh
         let expected = format!("{}, from the extent and the type", shape.n_bytes());
         return Err(ReadError::field(format!("length of {what}"), n_bytes, expected));
     }
+    if block_bytes == 0 && n_whole > 0 {
+        return Err(ReadError::field(format!("block size of {what}"), block_bytes, "at least 1"));
+    }
     check_length(what, n_left, u128::from(n_blocks) * words.size.n_bytes() as u128)?;
     check_ratio(what, n_left, n_bytes)?;
     let mut sizes = Vec::new();

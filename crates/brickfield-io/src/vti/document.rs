@@ -256,7 +256,7 @@ fn attribute(e: &BytesStart, name: &'static str) -> Result<Option<String>, ReadE
     let Some(found) = e.try_get_attribute(name).map_err(|e| malformed(quick_xml::Error::from(e)))? else {
         return Ok(None);
     };
-    let value = found.normalized_value(XmlVersion::Implicit1_0).map_err(|e| malformed(e.into()))?;
+    let value = found.normalized_value(XmlVersion::Implicit1_0).map_err(malformed)?;
     Ok(Some(value.into_owned()))
 }
 

@@ -131,12 +131,29 @@ fn read_array(
             append_text(&mut voxels, &mut UntilTag::new(source), shape.n_voxels(), &what)?;
             Ok(voxels)
         }
-        Storage::Raw => read_binary(source, n_left, document, shape, &what),
+        Storage::Raw => {
+            let n_tail = n_closing_bytes(source, n_left).map_err(|e| ReadError::io(&what, e))?;
+            read_binary(source, n_left - n_tail, document, shape, &what)
+        }
         Storage::Base64 => {
             let mut decoded = Base64Reader::new(UntilTag::new(source));
             read_binary(&mut decoded, n_left / 4 * 3 + 3, document, shape, &what)
         }
     }
+}
+
+/// Bytes of the closing tags after raw data: of data that are cut short they must not become the last samples.
+///
+/// The source stays where it is.
+fn n_closing_bytes(source: &mut dyn ByteSource, n_left: u64) -> std::io::Result<u64> {
+    const TAG: &[u8] = b"</AppendedData";
+    let n_tail = n_left.min(256);
+    source.seek_relative((n_left - n_tail) as i64)?;
+    let mut tail = vec![0; n_tail as usize];
+    source.read_exact(&mut tail)?;
+    source.seek_relative(-(n_left as i64))?;
+    let tag = tail.windows(TAG.len()).rposition(|w| w == TAG);
+    Ok(tag.map_or(0, |at| n_tail - at as u64))
 }
 
 /// `n_left` is the most bytes that the reader can give.

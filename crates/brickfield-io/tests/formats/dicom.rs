@@ -186,12 +186,14 @@ fn slices_are_sorted_along_their_normal() {
 fn every_transfer_syntax_and_type() {
     let pixels = vec![0, 1, 100, 7, 8, 99];
     for syntax in [Syntax::Explicit, Syntax::Implicit, Syntax::BigEndian, Syntax::Rle] {
-        let types = [(8, 0, ScalarType::U8), (8, 1, ScalarType::I8), (16, 0, ScalarType::U16), (16, 1, ScalarType::I16)];
+        let types =
+            [(8, 0, ScalarType::U8), (8, 1, ScalarType::I8), (16, 0, ScalarType::U16), (16, 1, ScalarType::I16)];
         for (allocated, signed, scalar) in types {
             if syntax == Syntax::BigEndian && allocated == 8 {
                 continue;
             }
-            let slice = Slice { syntax, bits: (allocated, allocated, signed), pixels: pixels.clone(), ..Slice::at(0.0) };
+            let slice =
+                Slice { syntax, bits: (allocated, allocated, signed), pixels: pixels.clone(), ..Slice::at(0.0) };
             let opened = read(&[slice]).unwrap();
             assert_eq!(opened.volume.scalar_type(), scalar);
             assert_eq!(voxels(&opened), [0.0, 1.0, 100.0, 7.0, 8.0, 99.0], "{scalar}");
@@ -202,7 +204,8 @@ fn every_transfer_syntax_and_type() {
 
 #[test]
 fn bits_beyond_the_stored_ones_are_no_part_of_the_value() {
-    let slice = |signed| Slice { bits: (16, 12, signed), pixels: vec![0xf001, 0x0fff, 0x0800, 0x07ff, 0, 1], ..Slice::at(0.0) };
+    let slice =
+        |signed| Slice { bits: (16, 12, signed), pixels: vec![0xf001, 0x0fff, 0x0800, 0x07ff, 0, 1], ..Slice::at(0.0) };
     assert_eq!(voxels(&read(&[slice(0)]).unwrap()), [1.0, 4095.0, 2048.0, 2047.0, 0.0, 1.0]);
     assert_eq!(voxels(&read(&[slice(1)]).unwrap()), [1.0, -1.0, -2048.0, 2047.0, 0.0, 1.0]);
 }
@@ -270,6 +273,12 @@ fn lengths_beyond_the_file_are_refused_before_they_are_allocated() {
         let fault = read(whole[..n].to_vec()).unwrap_err().to_string();
         assert!(!fault.contains('\n'), "{fault}");
     }
+    let nested = [
+        whole[..whole.len() - 24].to_vec(),
+        b"\x08\0\x40\x11SQ\0\0\xff\xff\xff\xff\xfe\xff\0\xe0\xff\xff\xff\xff".repeat(100_000),
+    ];
+    let fault = read(nested.concat()).unwrap_err().to_string();
+    assert_eq!(fault, "nesting of sequences is \"33\"; expected at most 32");
     let mut huge = whole.clone();
     let at = whole.len() - 12 - 4;
     huge[at..at + 4].copy_from_slice(&0xffff_fff0u32.to_le_bytes());

@@ -11,6 +11,7 @@ mod nrrd;
 #[cfg(feature = "ome-zarr")]
 mod ome_zarr;
 mod raw;
+mod seeds;
 #[cfg(feature = "tiff")]
 mod tiff;
 #[cfg(feature = "vti")]

@@ -67,7 +67,8 @@ fn detached_data_in_one_file_a_list_or_a_pattern() {
 
 #[test]
 fn spacing_offset_and_directions() {
-    let more = "ElementSpacing = 2 3 4\nOffset = 10 20 30\nTransformMatrix = 0 1 0 1 0 0 0 0 -1\nAnatomicalOrientation = RAI";
+    let more =
+        "ElementSpacing = 2 3 4\nOffset = 10 20 30\nTransformMatrix = 0 1 0 1 0 0 0 0 -1\nAnatomicalOrientation = RAI";
     let opened = read(&header("MET_UCHAR", more, "LOCAL"), &[0; 24], &NoFiles).unwrap();
     assert_near(centre(&opened, 1.0, 1.0, 1.0), [13.0, 22.0, 26.0]);
     assert_eq!((opened.frame, opened.volume.grid().spacing()), (WorldFrame::Lps, DVec3::new(2.0, 3.0, 4.0)));
@@ -80,7 +81,8 @@ fn two_and_four_dimensions() {
     let flat = "NDims = 2\nDimSize = 4 3\nElementSpacing = 2 3\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
     let flat = read(flat, &[0; 12], &NoFiles).unwrap();
     assert_eq!(flat.volume.grid().spacing(), DVec3::new(2.0, 3.0, 1.0));
-    let series = "NDims = 4\nDimSize = 4 3 2 5\nElementSpacing = 1 1 1 9\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
+    let series =
+        "NDims = 4\nDimSize = 4 3 2 5\nElementSpacing = 1 1 1 9\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
     let series = read(series, &[0; 120], &NoFiles).unwrap();
     assert!(matches!(&series.notes[..], [Note::FirstOfAxis { n_entries: 5, .. }]));
 }

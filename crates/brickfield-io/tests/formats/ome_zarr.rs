@@ -6,17 +6,20 @@ use brickfield_io::{ByteOrder, Note, Opened, ReadError, ome_zarr, open};
 
 use crate::common::*;
 
-type Entries = BTreeMap<String, Vec<u8>>;
+pub(crate) type Entries = BTreeMap<String, Vec<u8>>;
 
 fn read(entries: &Entries) -> Result<Opened, ReadError> {
     ome_zarr::read_entries(entries, &LIMITS)
 }
 
 const SCALE: &str = r#"[{"type":"scale","scale":[4,3,2]},{"type":"translation","translation":[30,20,10]}]"#;
-const ZYX: &str = r#"[{"name":"z","type":"space","unit":"micrometer"},{"name":"y","type":"space"},{"name":"x","type":"space"}]"#;
+const ZYX: &str =
+    r#"[{"name":"z","type":"space","unit":"micrometer"},{"name":"y","type":"space"},{"name":"x","type":"space"}]"#;
 
 fn multiscales(axes: &str, transformations: &str) -> String {
-    format!(r#""multiscales":[{{"version":"0.4","axes":{axes},"datasets":[{{"path":"s0","coordinateTransformations":{transformations}}}]}}]"#)
+    format!(
+        r#""multiscales":[{{"version":"0.4","axes":{axes},"datasets":[{{"path":"s0","coordinateTransformations":{transformations}}}]}}]"#
+    )
 }
 
 /// Version 0.4: Zarr v2.
@@ -172,9 +175,7 @@ fn bombs_and_lies() {
     let chunk = zstd::encode_all(&bomb[..], 1).unwrap();
     let zstd = read(&v3("uint8", "[2,3,4]", "[2,3,4]", &codecs, &[("0/0/0", chunk)])).unwrap_err();
     assert!(matches!(zstd, ReadError::TooLarge { max_bytes: 24, .. }), "{zstd}");
-    let refusal = |shape, chunk| {
-        read(&v3("uint8", shape, chunk, &format!("[{LITTLE}]"), &[])).unwrap_err().to_string()
-    };
+    let refusal = |shape, chunk| read(&v3("uint8", shape, chunk, &format!("[{LITTLE}]"), &[])).unwrap_err().to_string();
     assert!(refusal("[1099511627776,1,1]", "[1,1,1]").contains("dimension z is \"1099511627776\""));
     assert!(refusal("[10000,10000,10000]", "[1,1,1]").contains("limit"));
     assert!(refusal("[2,3,4]", "[10000,10000,10000]").contains("a chunk of shape"));
@@ -187,6 +188,19 @@ fn bombs_and_lies() {
     let attributes = String::from_utf8(outside[".zattrs"].clone()).unwrap().replace("\"s0\"", "\"../s0\"");
     outside.insert(".zattrs".to_owned(), attributes.into_bytes());
     assert!(read(&outside).unwrap_err().to_string().contains("a path within the folder"));
+}
+
+/// Fixtures of both versions.
+pub(crate) fn examples() -> [Entries; 3] {
+    let data = bytes(&ramp(ScalarType::U8), ByteOrder::Little);
+    let codecs = format!(r#"[{LITTLE},{{"name":"zstd","configuration":{{"level":1,"checksum":false}}}}]"#);
+    let packed = zstd::encode_all(&data[..], 1).unwrap();
+    let parts = shard([gzip(&data[..12]), gzip(&data[12..])]);
+    [
+        v2("|u1", r#"{"id":"gzip","level":1}"#, gzip(&data)),
+        v3("uint8", "[2,3,4]", "[2,3,4]", &codecs, &[("0/0/0", packed)]),
+        v3("uint8", "[2,3,4]", "[2,3,4]", SHARDING, &[("0/0/0", parts)]),
+    ]
 }
 
 #[test]

@@ -10,7 +10,8 @@ use crate::common::{DIMS, LIMITS, ORDERS, assert_near, assert_ramp, bytes, centr
 fn every_type_in_both_orders_after_a_header() {
     for scalar in ScalarType::ALL {
         for order in ORDERS {
-            let spec = RawSpec { order, skip_bytes: 7, spacing: DVec3::new(1.0, 2.0, 3.0), ..RawSpec::new(DIMS, scalar) };
+            let spec =
+                RawSpec { order, skip_bytes: 7, spacing: DVec3::new(1.0, 2.0, 3.0), ..RawSpec::new(DIMS, scalar) };
             let file = [b"7 bytes".to_vec(), bytes(&ramp(scalar), order)].concat();
             let opened = raw::read(Cursor::new(file), &spec, &LIMITS).unwrap();
             assert_ramp(&opened, scalar);

@@ -70,8 +70,7 @@ fn imagej_spacing_and_channels() {
 fn big_endian(samples: [u8; 4]) -> Vec<u8> {
     let mut out = b"MM\0\x2a\0\0\0\x0c".to_vec();
     out.extend(samples);
-    let tags: [(u16, u16); 8] =
-        [(256, 2), (257, 1), (258, 16), (259, 1), (262, 1), (273, 8), (277, 1), (279, 4)];
+    let tags: [(u16, u16); 8] = [(256, 2), (257, 1), (258, 16), (259, 1), (262, 1), (273, 8), (277, 1), (279, 4)];
     out.extend((tags.len() as u16).to_be_bytes());
     for (tag, value) in tags {
         out.extend(tag.to_be_bytes());
@@ -81,6 +80,16 @@ fn big_endian(samples: [u8; 4]) -> Vec<u8> {
     }
     out.extend([0; 4]);
     out
+}
+
+/// Fixtures in both byte orders.
+pub(crate) fn examples() -> [Vec<u8>; 3] {
+    let description = "ImageJ=1.53\nimages=2\nslices=2\nspacing=1.5\nunit=micron\n";
+    [
+        stack::<colortype::Gray16>(&[7; 24], Compression::Lzw, description),
+        stack::<colortype::Gray32Float>(&[0.5; 24], Compression::Deflate(Default::default()), ""),
+        big_endian([1, 2, 3, 4]),
+    ]
 }
 
 #[test]

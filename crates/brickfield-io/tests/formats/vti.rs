@@ -84,7 +84,10 @@ fn every_type_order_word_and_encoding() {
     for scalar in ScalarType::ALL {
         let ramp = ramp(scalar);
         let type_name = type_name(scalar);
-        assert_ramp(&read(inline(PLAIN, &format!("type=\"{type_name}\" format=\"ascii\""), &text(&ramp))).unwrap(), scalar);
+        assert_ramp(
+            &read(inline(PLAIN, &format!("type=\"{type_name}\" format=\"ascii\""), &text(&ramp))).unwrap(),
+            scalar,
+        );
         for (order, word_bytes) in [(ORDERS[0], 4), (ORDERS[0], 8), (ORDERS[1], 4), (ORDERS[1], 8)] {
             let data = bytes(&ramp, order);
             let style = Style { order, word_bytes, compressor: "" };
@@ -105,7 +108,8 @@ fn check(style: Style, type_name: &str, scalar: ScalarType, header: &[u8], data:
         let broken = format!("{}\n  {}", &text[..7], &text[7..]);
         let file = inline(style, &format!("type=\"{type_name}\" format=\"binary\""), &broken);
         assert_ramp(&read(file).unwrap(), scalar);
-        let file = appended(style, &format!("type=\"{type_name}\" offset=\"4\""), "base64", format!("abc={text}").as_bytes());
+        let file =
+            appended(style, &format!("type=\"{type_name}\" offset=\"4\""), "base64", format!("abc={text}").as_bytes());
         assert_ramp(&read(file).unwrap(), scalar);
     }
     let raw = [b"<_&", header, data].concat();
@@ -117,7 +121,10 @@ fn check(style: Style, type_name: &str, scalar: ScalarType, header: &[u8], data:
 fn extent_origin_spacing_and_direction() {
     let file = inline(PLAIN, "type=\"UInt8\"", &"1 ".repeat(24))
         .replace("Extent=\"0 3 0 2 0 1\"", "Extent=\"-1 2 10 12 5 6\"")
-        .replace("Origin=\"0 0 0\" Spacing=\"1 1 1\"", "Origin=\"1 2 3\" Spacing=\"2 3 4\" Direction=\"0 1 0 1 0 0 0 0 -1\"");
+        .replace(
+            "Origin=\"0 0 0\" Spacing=\"1 1 1\"",
+            "Origin=\"1 2 3\" Spacing=\"2 3 4\" Direction=\"0 1 0 1 0 0 0 0 -1\"",
+        );
     let opened = read(file).unwrap();
     assert_eq!(opened.volume.grid().dims(), DIMS);
     assert_eq!(opened.volume.grid().spacing(), DVec3::new(2.0, 3.0, 4.0));
@@ -154,7 +161,7 @@ fn documents_that_lie() {
         assert!(file.contains(from), "{from}");
         read(file.replace(from, to)).unwrap_err().to_string()
     };
-    assert!(refusal("0 3 0 2 0 1", "0 3 0 2 0 9223372036854775807").contains("limit"));
+    assert!(refusal("0 3 0 2 0 1", "0 3 0 2 0 9223372036854775807").contains("dimension z"));
     assert!(refusal("0 3 0 2 0 1", "0 3 0 2 0 -7").contains("Extent"));
     assert!(refusal("0 3 0 2 0 1", "0 3").contains("6 numbers"));
     assert!(refusal("type=\"UInt8\"", "type=\"Int64\"").contains("DataArray type \"Int64\" is not supported"));
@@ -162,7 +169,7 @@ fn documents_that_lie() {
     assert!(refusal("<VTKFile", "<HTML").contains("root element"));
     assert!(refusal("</Piece>", "</Piece><Piece Extent=\"0 1 0 1 0 1\"></Piece>").contains("number of pieces"));
     assert!(refusal("DataArray ", "NoArray ").contains("DataArray"));
-    assert!(refusal("0 </Data", "</Data").contains("too few") || refusal("0 \n</Data", "</Data").contains("23 samples"));
+    assert!(refusal("0 \n</Data", "</Data").contains("23 samples"));
     assert!(refusal("0 \n</Data", "x</Data").contains("sample 23"));
     assert!(refusal("UInt32\"", "UInt32\" compressor=\"vtkLZ4DataCompressor\"").contains("LZ4"));
     let bad = |data: &[u8], compressor| {
@@ -174,5 +181,5 @@ fn documents_that_lie() {
     let zlib = " compressor=\"vtkZLibDataCompressor\"";
     assert!(bad(&PLAIN.words(&[1, 24, 0, 5, 0]), zlib).contains("cannot read"));
     assert!(bad(&PLAIN.words(&[usize::MAX, 24, 0]), zlib).contains("length of DataArray"));
-    assert!(bad(&PLAIN.words(&[u32::MAX as usize, 0, 24]), zlib).contains("promised"));
+    assert!(bad(&PLAIN.words(&[u32::MAX as usize, 0, 24]), zlib).contains("block size"));
 }

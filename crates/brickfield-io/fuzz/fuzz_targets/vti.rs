@@ -1,0 +1,10 @@
+#![no_main]
+
+use std::io::Cursor;
+
+use brickfield_io::{Limits, vti};
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| {
+    let _ = vti::read(Cursor::new(bytes), &Limits { max_bytes: 1 << 20 });
+});
