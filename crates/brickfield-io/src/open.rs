@@ -1,7 +1,7 @@
 //! Opening a path, whatever format it is in.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader};
 use std::path::Path;
 
 use crate::error::Shown;
@@ -68,6 +68,7 @@ fn detect_file(path: &Path) -> Result<Format, ReadError> {
 fn ungzipped(head: &[u8]) -> Option<Vec<u8>> {
     #[cfg(feature = "gzip")]
     if head.starts_with(&[0x1f, 0x8b]) {
+        use std::io::Read;
         let mut inner = vec![0; HEAD_BYTES as usize];
         let mut gz = flate2::read::GzDecoder::new(head);
         let mut n = 0;
@@ -132,6 +133,8 @@ fn open_file(path: &Path, format: Format, limits: &Limits) -> Result<Opened, Rea
 }
 
 fn open_folder(path: &Path, format: Format, limits: &Limits) -> Result<Opened, ReadError> {
+    #[cfg(not(any(feature = "dicom", feature = "ome-zarr")))]
+    let _ = (path, limits);
     match format {
         #[cfg(feature = "dicom")]
         Format::Dicom => {

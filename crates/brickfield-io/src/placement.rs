@@ -28,6 +28,7 @@ impl Placement {
         Placement { first_sample, steps }
     }
 
+    #[cfg(feature = "nifti")]
     /// The same place with +x and +y negated: right-anterior-superior to left-posterior-superior and back.
     pub(crate) fn negated_xy(self) -> Placement {
         self.scaled(DVec3::new(-1.0, -1.0, 1.0))

@@ -1,9 +1,14 @@
 //! Applying a file's slope and intercept.
 
-use brickfield_core::{Scalar, ScalarType, Voxels, with_voxels};
+use brickfield_core::ScalarType;
+#[cfg(feature = "nifti")]
+use brickfield_core::{Scalar, Voxels, with_voxels};
 
+#[cfg(feature = "nifti")]
 use crate::limits::{Limits, check_bytes};
-use crate::{Note, ReadError};
+use crate::Note;
+#[cfg(feature = "nifti")]
+use crate::ReadError;
 
 /// value = slope * stored + intercept.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +46,7 @@ pub(crate) fn rescaled_type(stored: ScalarType) -> ScalarType {
 ///
 /// # Errors
 /// If the rescaled voxels would be beyond the limits.
+#[cfg(feature = "nifti")]
 pub(crate) fn rescaled(voxels: Voxels, rescale: Rescale, limits: &Limits) -> Result<Voxels, ReadError> {
     if rescale == Rescale::IDENTITY {
         return Ok(voxels);
@@ -54,7 +60,8 @@ pub(crate) fn rescaled(voxels: Voxels, rescale: Rescale, limits: &Limits) -> Res
 }
 
 /// Voxels as `T`, rescaled; a value outside `T` saturates.
-pub(crate) fn mapped<T: Scalar>(voxels: &Voxels, rescale: Rescale) -> Result<Voxels, ReadError> {
+#[cfg(feature = "nifti")]
+fn mapped<T: Scalar>(voxels: &Voxels, rescale: Rescale) -> Result<Voxels, ReadError> {
     let mut values = Vec::<T>::new();
     let n_bytes = voxels.len() as u128 * size_of::<T>() as u128;
     values.try_reserve_exact(voxels.len()).map_err(|_| ReadError::OutOfMemory { n_bytes })?;

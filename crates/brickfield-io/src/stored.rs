@@ -1,6 +1,6 @@
 //! How samples are stored in a data file, and reading one file of them.
 
-use std::io::{self, BufRead, Read, SeekFrom};
+use std::io::{self, BufRead, SeekFrom};
 
 use brickfield_core::Voxels;
 
@@ -118,6 +118,7 @@ impl Stored {
             Encoding::Text => append_text(voxels, source, part.n_wanted, part.name)?,
             #[cfg(feature = "gzip")]
             Encoding::Deflate => {
+                use std::io::Read;
                 let mut inflated = crate::deflate::inflate(source).map_err(|e| ReadError::io(part.name, e))?;
                 let skip = self.compressed_skip()?;
                 io::copy(&mut (&mut inflated).take(skip), &mut io::sink()).map_err(|e| ReadError::io(part.name, e))?;

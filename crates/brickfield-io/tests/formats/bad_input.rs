@@ -16,6 +16,7 @@ pub(crate) struct Case {
 }
 
 pub(crate) fn cases() -> Vec<Case> {
+    #[allow(unused_mut)]
     let mut cases = vec![
         Case {
             name: "v.nrrd",
