@@ -17,18 +17,21 @@ pub(super) struct Unorm16;
 pub(super) struct Float32;
 
 impl Stored for Unorm8 {
+    #[inline(always)]
     fn read(bytes: &[u8], i: usize) -> f64 {
         f64::from(bytes[i])
     }
 }
 
 impl Stored for Unorm16 {
+    #[inline(always)]
     fn read(bytes: &[u8], i: usize) -> f64 {
         f64::from(u16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]]))
     }
 }
 
 impl Stored for Float32 {
+    #[inline(always)]
     fn read(bytes: &[u8], i: usize) -> f64 {
         let b = &bytes[4 * i..4 * i + 4];
         f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
@@ -58,6 +61,7 @@ impl<'a, S: Stored> Field<'a, S> {
     }
 
     /// The data value at a sample position; `None` where its block is transparent.
+    #[inline]
     pub(super) fn at(&self, q: DVec3) -> Option<f64> {
         let q = self.clamped(q);
         let cell = self.index_cell(q);
@@ -65,17 +69,21 @@ impl<'a, S: Stored> Field<'a, S> {
     }
 
     /// The position that the field is evaluated at.
+    #[inline]
     pub(super) fn clamped(&self, q: DVec3) -> DVec3 {
         q.clamp(DVec3::ZERO, self.last)
     }
 
     /// The index cell that owns a clamped position.
+    #[inline]
     pub(super) fn index_cell(&self, q: DVec3) -> UVec3 {
-        let cell = (q / (self.n - 1) as f64).floor().max(DVec3::ZERO).as_uvec3();
+        // Truncation is floor where it is not negative, and 0 below.
+        let cell = (q / (self.n - 1) as f64).as_uvec3();
         cell.min(self.plan.index.dims() - 1)
     }
 
     /// The data value at a clamped position, as the block around index cell `cell` has it.
+    #[inline]
     pub(super) fn in_block(&self, cell: UVec3, q: DVec3) -> Option<f64> {
         let cell = self.interpolation_cell(cell, q)?;
         let read = trilinear(&cell) / self.plan.bricks.format().unit();
@@ -83,13 +91,14 @@ impl<'a, S: Stored> Field<'a, S> {
     }
 
     /// The eight samples that the block around `cell` has for a clamped position.
+    #[inline]
     pub(super) fn interpolation_cell(&self, cell: UVec3, q: DVec3) -> Option<Cell> {
         let IndexEntry::Resident { slot, level } = self.plan.index.at(cell) else { return None };
         let s = self.in_brick(cell, level, q);
-        let i = s.floor().min(DVec3::splat((self.n - 2) as f64));
+        let i = s.as_uvec3().min(UVec3::splat(self.n as u32 - 2));
         let base = slot as usize * self.n.pow(3) + i.x as usize + self.n * (i.y as usize + self.n * i.z as usize);
         let sample = |c: usize| S::read(self.plan.bricks.bytes(), base + self.corner(c));
-        Some(Cell { samples: std::array::from_fn(sample), fraction: s - i })
+        Some(Cell { samples: std::array::from_fn(sample), fraction: s - i.as_dvec3() })
     }
 
     /// The position in the brick's own samples, [0, n - 1].

@@ -89,10 +89,12 @@ fn pixel<S: Stored>(field: &Field<S>, ambiguity: &Ambiguity, ray: &PlanRay) -> P
     let mut state = RayState::default();
     for part in segments(span, plan.sampling.step_world()) {
         let values = node_values(rule, |x| field.at(plan.rays.center + ray.at(part.at(x))));
-        let nodes = rule.nodes().len();
-        pixel.n_samples += nodes as u64;
-        pixel.n_visible_samples += n_visible(field, &values[..nodes]);
-        state.push(segment(plan, values, part.length()));
+        pixel.n_samples += rule.nodes().len() as u64;
+        let segment = segment(plan, values, part.length());
+        if segment.depth > 0.0 {
+            pixel.n_visible_samples += n_visible(field, &values);
+            state.push(segment);
+        }
     }
     pixel.rgba = state.rgba();
     pixel
@@ -121,7 +123,11 @@ fn one_gauss_node(plan: &FramePlan, value: f64, length_world: f64) -> Segment {
     QuadratureRule::MidpointExponential.segment(&plan.transfer, &[value], 0.5 * length_world)
 }
 
-fn n_visible<S: Stored>(field: &Field<S>, values: &[Option<f64>]) -> u64 {
+/// How many nodes of a visible segment have an extinction above 0.
+fn n_visible<S: Stored>(field: &Field<S>, values: &[Option<f64>; 2]) -> u64 {
+    if field.plan.sampling.rule().nodes().len() == 1 {
+        return 1;
+    }
     values.iter().flatten().filter(|v| field.plan.transfer.at(**v).extinction > 0.0).count() as u64
 }
 

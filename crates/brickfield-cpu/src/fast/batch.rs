@@ -5,22 +5,33 @@
 use brickfield_optics::QuadratureRule;
 
 use super::brick::{LANES, Lanes};
-use super::classify::Classifier;
+use super::classify::{Classifier, Stretch};
 use super::scalar::{THIN, alpha, alpha_thin};
 use super::segment::{Ray32, segment};
 
-/// Segments of a rule with one node, from the values there.
+/// The first `n` segments of a rule with one node, from the values there.
 #[inline(always)]
-pub(super) fn one_node(rule: QuadratureRule, transfer: &Classifier, values: &[f32], length: f32, state: &mut Ray32) {
-    let (low, high) = extent(values);
+pub(super) fn one_node(
+    rule: QuadratureRule,
+    transfer: &Classifier,
+    mut values: Lanes,
+    n: usize,
+    length: f32,
+    state: &mut Ray32,
+) {
+    if n < LANES {
+        let last = values[n - 1];
+        values[n..].fill(last);
+    }
+    let (low, high) = extent(&values);
     let stretch = transfer.stretch(low);
     if high < transfer.end(stretch) {
         if !transfer.is_dark(stretch) {
-            linear(rule, transfer, stretch, values, length, state);
+            linear(rule, transfer.linear(stretch), &values, n, length, state);
         }
         return;
     }
-    for value in values {
+    for value in &values[..n] {
         let i = transfer.stretch(*value);
         if !transfer.is_dark(i) {
             state.push(segment(rule, transfer, [Some(*value), None], length));
@@ -28,12 +39,13 @@ pub(super) fn one_node(rule: QuadratureRule, transfer: &Classifier, values: &[f3
     }
 }
 
-/// Segments of a rule with two nodes.
+/// The first `n` segments of a rule with two nodes.
 #[inline(always)]
 pub(super) fn two_nodes(
     rule: QuadratureRule,
     transfer: &Classifier,
-    (near, far): (&[f32], &[f32]),
+    (near, far): (&Lanes, &Lanes),
+    n: usize,
     length: f32,
     state: &mut Ray32,
 ) {
@@ -42,32 +54,28 @@ pub(super) fn two_nodes(
     if b.max(d) < transfer.end(stretch) && transfer.is_dark(stretch) {
         return;
     }
-    for (a, b) in near.iter().zip(far) {
+    for (a, b) in near.iter().zip(far).take(n) {
         state.push(segment(rule, transfer, [Some(*a), Some(*b)], length));
     }
 }
 
 /// Segments whose values all lie in one stretch of the transfer function.
+///
+/// The colours' sum needs two sums only: of the weights of the stretch's lower end and of its upper.
 #[inline(always)]
-fn linear(rule: QuadratureRule, transfer: &Classifier, stretch: usize, values: &[f32], length: f32, state: &mut Ray32) {
-    let mut v: Lanes = [values[0]; LANES];
-    v[..values.len()].copy_from_slice(values);
-    let (mut color, mut opacity) = ([[0f32; LANES]; 3], [0f32; LANES]);
-    let mut thickest = 0f32;
+fn linear(rule: QuadratureRule, stretch: Stretch, values: &Lanes, n: usize, length: f32, state: &mut Ray32) {
+    let (mut place, mut opacity) = ([0f32; LANES], [0f32; LANES]);
     for l in 0..LANES {
-        let o = transfer.on(stretch, v[l]);
-        for (to, from) in color.iter_mut().zip(o.color) {
-            to[l] = from;
-        }
-        opacity[l] = o.extinction * length;
-        thickest = if opacity[l] > thickest { opacity[l] } else { thickest };
+        place[l] = stretch.place(values[l]);
+        opacity[l] = stretch.extinction(place[l]) * length;
     }
+    let thickest = extent(&opacity).1;
     opacities(rule, &mut opacity, thickest);
-    let weight = weights(&opacity[..values.len()], state);
-    for (c, color) in color.iter().enumerate() {
-        state.rgba[c] += f64::from(dot(&weight, color));
+    let weight = weights(&opacity[..n], state);
+    let (low, high) = sums(&weight, &place);
+    for (sum, x) in state.rgba.iter_mut().zip(stretch.rgba(low, high)) {
+        *sum += f64::from(x);
     }
-    state.rgba[3] += f64::from(dot(&weight, &[1.0; LANES]));
 }
 
 /// Turns depths into opacities.
@@ -91,21 +99,32 @@ fn weights(opacity: &[f32], state: &mut Ray32) -> Lanes {
     weight
 }
 
+/// Sums of weight (1 - place) and of weight place.
 #[inline(always)]
-fn dot(a: &Lanes, b: &Lanes) -> f32 {
-    let mut sums = [0f32; 4];
+fn sums(weight: &Lanes, place: &Lanes) -> (f32, f32) {
+    let (mut low, mut high) = ([0f32; 8], [0f32; 8]);
     for l in 0..LANES {
-        sums[l % 4] += a[l] * b[l];
+        low[l % 8] += weight[l] * (1.0 - place[l]);
+        high[l % 8] += weight[l] * place[l];
     }
-    (sums[0] + sums[2]) + (sums[1] + sums[3])
+    (total(low), total(high))
 }
 
 #[inline(always)]
-fn extent(values: &[f32]) -> (f32, f32) {
-    let (mut low, mut high) = (values[0], values[0]);
-    for v in values {
-        low = if *v < low { *v } else { low };
-        high = if *v > high { *v } else { high };
+fn total(x: [f32; 8]) -> f32 {
+    ((x[0] + x[4]) + (x[1] + x[5])) + ((x[2] + x[6]) + (x[3] + x[7]))
+}
+
+/// Least and greatest number.
+#[inline(always)]
+fn extent(values: &Lanes) -> (f32, f32) {
+    let (mut low, mut high) = ([f32::MAX; 8], [f32::MIN; 8]);
+    for l in 0..LANES {
+        let v = values[l];
+        low[l % 8] = if v < low[l % 8] { v } else { low[l % 8] };
+        high[l % 8] = if v > high[l % 8] { v } else { high[l % 8] };
     }
-    (low, high)
+    let less = |a: f32, b: f32| if b < a { b } else { a };
+    let more = |a: f32, b: f32| if b > a { b } else { a };
+    (low.into_iter().fold(f32::MAX, less), high.into_iter().fold(f32::MIN, more))
 }

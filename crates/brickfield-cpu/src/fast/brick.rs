@@ -1,6 +1,6 @@
 //! Samples of one brick in f32: several nodes of a ray at a time, so that the compiler can use vector registers.
 //!
-//! Brick sides are powers of two: an index masked with n^3 - 1 is in range by construction, and no bounds check is left.
+//! Indices are held below a bound that the compiler knows, so that no bounds check is left.
 
 use brickfield_frame::SampleFormat;
 
@@ -18,8 +18,8 @@ pub(super) trait Stored: Copy + Send + Sync + 'static {
     const FORMAT: SampleFormat;
     /// Two samples that are neighbours along x, as they are stored.
     type Pair: Copy + Default;
-    /// Samples `i` and `i + 1`, reading nothing behind the brick's `n` samples; `n` is a power of two.
-    fn pair(bytes: &[u8], i: usize, n: usize) -> Self::Pair;
+    /// Samples `i` and `i + 1` of a brick.
+    fn pair(bytes: &[u8], i: usize) -> Self::Pair;
     /// The stored numbers of a pair, less `bias`.
     fn split(pair: Self::Pair, bias: f32) -> (f32, f32);
 }
@@ -36,12 +36,13 @@ impl Stored for Unorm8 {
     const FORMAT: SampleFormat = SampleFormat::Unorm8;
     type Pair = u32;
     #[inline(always)]
-    fn pair(bytes: &[u8], i: usize, n: usize) -> u32 {
-        u32::from(bytes[i & (n - 1)]) | u32::from(bytes[(i + 1) & (n - 1)]) << 16
+    fn pair(bytes: &[u8], i: usize) -> u32 {
+        let b = &bytes[i..i + 2];
+        u32::from(u16::from_le_bytes([b[0], b[1]]))
     }
     #[inline(always)]
     fn split(pair: u32, _: f32) -> (f32, f32) {
-        ((pair & 0xffff) as i32 as f32, (pair >> 16) as i32 as f32)
+        ((pair & 0xff) as i32 as f32, (pair >> 8) as i32 as f32)
     }
 }
 
@@ -50,9 +51,9 @@ impl Stored for Unorm16 {
     const FORMAT: SampleFormat = SampleFormat::Unorm16;
     type Pair = u32;
     #[inline(always)]
-    fn pair(bytes: &[u8], i: usize, n: usize) -> u32 {
-        let at = |i: usize| u32::from(u16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]]));
-        at(i & (n - 1)) | at((i + 1) & (n - 1)) << 16
+    fn pair(bytes: &[u8], i: usize) -> u32 {
+        let b = &bytes[2 * i..2 * i + 4];
+        u32::from_le_bytes([b[0], b[1], b[2], b[3]])
     }
     /// 16 bits leave f32 only 8 bits for fractions: numbers are counted from the one that stands for the first knot.
     #[inline(always)]
@@ -64,15 +65,15 @@ impl Stored for Unorm16 {
 impl Stored for Float32 {
     const N_BYTES: usize = 4;
     const FORMAT: SampleFormat = SampleFormat::Float32;
-    type Pair = [f32; 2];
+    type Pair = u64;
     #[inline(always)]
-    fn pair(bytes: &[u8], i: usize, n: usize) -> [f32; 2] {
-        let at = |i: usize| f32::from_le_bytes([bytes[4 * i], bytes[4 * i + 1], bytes[4 * i + 2], bytes[4 * i + 3]]);
-        [at(i & (n - 1)), at((i + 1) & (n - 1))]
+    fn pair(bytes: &[u8], i: usize) -> u64 {
+        let b = &bytes[4 * i..4 * i + 8];
+        u64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]])
     }
     #[inline(always)]
-    fn split(pair: [f32; 2], _: f32) -> (f32, f32) {
-        (pair[0], pair[1])
+    fn split(pair: u64, _: f32) -> (f32, f32) {
+        (f32::from_bits(pair as u32), f32::from_bits((pair >> 32) as u32))
     }
 }
 
@@ -96,23 +97,24 @@ impl Nodes {
     pub(super) fn stored<const N: usize, S: Stored>(&self, brick: &[u8], first: f32) -> Lanes {
         let brick = &brick[..N * N * N * S::N_BYTES];
         let (mut base, mut fraction) = ([0u32; LANES], [[0f32; LANES]; 3]);
-        for axis in 0..3 {
-            let (origin, change, last) =
-                (self.origin[axis] + self.change[axis] * first, self.change[axis], self.last[axis]);
+        for (axis, fraction) in fraction.iter_mut().enumerate() {
+            let (change, last) = (self.change[axis], self.last[axis]);
+            let origin = self.origin[axis] + change * first;
             let stride = N.pow(axis as u32) as u32;
             for l in 0..LANES {
                 let s = at_least(at_most(origin + change * l as f32, last), 0.0);
                 // Below or at s: where s is an integer, either cell has its value.
                 let rounded = (s - 0.5) + ROUND;
-                fraction[axis][l] = s - (rounded - ROUND);
+                fraction[l] = s - (rounded - ROUND);
                 base[l] += (rounded.to_bits() & (N as u32 - 1)) * stride;
             }
         }
         let mut pairs = [[S::Pair::default(); LANES]; 4];
         for l in 0..LANES {
-            let i = base[l] as usize;
+            // Holds anyway; so the compiler knows it too.
+            let i = (base[l] as usize).min(N * N * N - N * N - N - 2);
             for (pair, corner) in pairs.iter_mut().zip([0, N, N * N, N * N + N]) {
-                pair[l] = S::pair(brick, i + corner, N * N * N);
+                pair[l] = S::pair(brick, i + corner);
             }
         }
         let [fx, fy, fz] = &fraction;

@@ -11,7 +11,7 @@ pub(super) struct Optics32 {
 
 /// A stretch of values in which the transfer function is linear.
 #[derive(Clone, Copy, Debug)]
-struct Stretch {
+pub(super) struct Stretch {
     start: f32,
     /// Reciprocal of the stretch's length; 0 where the function is constant.
     reciprocal: f32,
@@ -76,11 +76,15 @@ impl Classifier {
     #[inline(always)]
     pub(super) fn on(&self, i: usize, value: f32) -> Optics32 {
         let s = &self.stretches[i];
-        let f = (value - s.start) * s.reciprocal;
-        let f = if f > 0.0 { f } else { 0.0 };
-        let f = if f < 1.0 { f } else { 1.0 };
-        let mix = |c: usize| s.low[c] * (1.0 - f) + s.high[c] * f;
-        Optics32 { extinction: mix(3), color: [mix(0), mix(1), mix(2)] }
+        let f = s.place(value);
+        let [r, g, b, _] = s.rgba(1.0 - f, f);
+        Optics32 { extinction: s.extinction(f), color: [r, g, b] }
+    }
+
+    /// Stretch `i`.
+    #[inline(always)]
+    pub(super) fn linear(&self, i: usize) -> Stretch {
+        self.stretches[i]
     }
 
     /// Whether nothing of stretch `i` is visible.
@@ -99,6 +103,29 @@ impl Classifier {
     #[inline(always)]
     pub(super) fn end(&self, i: usize) -> f32 {
         self.ends[i]
+    }
+}
+
+impl Stretch {
+    /// Where a value lies, from 0 at the lower end to 1 at the upper.
+    #[inline(always)]
+    pub(super) fn place(&self, value: f32) -> f32 {
+        let f = (value - self.start) * self.reciprocal;
+        let f = if f > 0.0 { f } else { 0.0 };
+        if f < 1.0 { f } else { 1.0 }
+    }
+
+    /// Extinction at a place.
+    #[inline(always)]
+    pub(super) fn extinction(&self, place: f32) -> f32 {
+        self.low[3] * (1.0 - place) + self.high[3] * place
+    }
+
+    /// The ends' colours with the given weights, and the weights' sum.
+    #[inline(always)]
+    pub(super) fn rgba(&self, low: f32, high: f32) -> [f32; 4] {
+        let mix = |c: usize| self.low[c] * low + self.high[c] * high;
+        [mix(0), mix(1), mix(2), low + high]
     }
 }
 

@@ -6,6 +6,7 @@ use brickfield_frame::{IndexEntry, PlanRay};
 
 use super::batch;
 use super::brick::{LANES, Nodes, Stored};
+use super::detail::{Parts, Runs};
 use super::scene::{Block, Scene};
 use super::segment::{Ray32, Segment32, segment};
 
@@ -32,6 +33,7 @@ impl Path<'_> {
 }
 
 /// The pixel of a ray.
+#[inline(always)]
 pub(super) fn march<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRay) -> [f32; 4] {
     let plan = scene.plan;
     let least = -plan.rays.start;
@@ -52,6 +54,7 @@ fn floor(x: f64) -> i64 {
 }
 
 /// Segments `from..to`, block by block.
+#[inline(always)]
 fn along<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, from: i64, to: i64, state: &mut Ray32) {
     let nodes = scene.plan.sampling.rule().nodes();
     let (near, far) = (nodes[0], nodes[nodes.len() - 1]);
@@ -79,6 +82,7 @@ fn single<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, k: i64) -
 }
 
 /// All whole segments from `k` on whose nodes lie in the block of segment `k`'s first node; returns how many they are.
+#[inline(always)]
 fn run<const N: usize, S: Stored>(
     scene: &Scene<N, S>,
     path: &Path,
@@ -100,12 +104,19 @@ fn run<const N: usize, S: Stored>(
             last: array(((scene.last - block.corner) * scale).min(DVec3::splat((N - 1) as f64))),
             bias: scene.bias,
         };
-        Inner { brick: scene.brick(slot), nodes, far: (far - near) as f32 }.march(scene, 0, n, state);
+        let inner = Inner { brick: scene.brick(slot), nodes, far: (far - near) as f32 };
+        match scene.visible.get(slot as usize) {
+            Some(&parts) if parts != Parts::MAX => {
+                Runs::new::<N>(&nodes, inner.far, parts, n).for_each(|(from, to)| inner.march(scene, from, to, state));
+            }
+            _ => inner.march(scene, 0, n, state),
+        }
     }
     n
 }
 
 /// Where the ray leaves a block.
+#[inline(always)]
 fn exit<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRay, block: &Block) -> f64 {
     let origin = ray.anchor + scene.center;
     let mut exit = f64::INFINITY;
@@ -138,10 +149,10 @@ impl Inner<'_> {
             let n = ((to - first) as usize).min(LANES);
             let near = scene.values(&self.nodes, self.brick, first as f32);
             match rule.nodes().len() {
-                1 => batch::one_node(rule, &scene.transfer, &near[..n], length, state),
+                1 => batch::one_node(rule, &scene.transfer, near, n, length, state),
                 _ => {
                     let far = scene.values(&self.nodes, self.brick, first as f32 + self.far);
-                    batch::two_nodes(rule, &scene.transfer, (&near[..n], &far[..n]), length, state);
+                    batch::two_nodes(rule, &scene.transfer, (&near, &far), n, length, state);
                 }
             }
             if state.transmittance < floor {
@@ -152,6 +163,7 @@ impl Inner<'_> {
 }
 
 /// Where the ray runs in a box relative to the frame's centre, at parameters of at least `least`.
+#[inline(always)]
 fn clip(ray: &PlanRay, (min, max): (DVec3, DVec3), least: f64) -> Option<Span> {
     let (mut start, mut end) = (least - ray.t_anchor, f64::INFINITY);
     for axis in 0..3 {

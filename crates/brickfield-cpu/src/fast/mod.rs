@@ -3,6 +3,7 @@
 mod batch;
 mod brick;
 mod classify;
+mod detail;
 mod march;
 mod scalar;
 mod scene;
@@ -11,13 +12,14 @@ mod segment;
 use std::time::Instant;
 
 use brickfield_core::glam::{DVec3, UVec2};
-use brickfield_core::{BrickSide, Image};
+use brickfield_core::{BrickSide, Image, TransferFunction};
 use brickfield_frame::{
     Backend, Capabilities, Description, Frame, FramePlan, IndexEntry, RenderError, SampleFormat, ShaderFunction, Timing,
 };
 use rayon::prelude::*;
 
 use brick::{Float32, Stored, Unorm8, Unorm16};
+use detail::{Detail, Parts};
 use scene::Scene;
 
 /// Most pixels along a side of a picture.
@@ -30,16 +32,19 @@ const MAX_IMAGE: u32 = 1 << 16;
 #[derive(Clone, Debug)]
 pub struct CpuBackend {
     description: Description,
+    /// Of the last plan with something to pass over.
+    detail: Option<Detail>,
 }
 
 impl CpuBackend {
     /// The backend for this machine.
     pub fn new() -> CpuBackend {
         CpuBackend {
+            detail: None,
             description: Description {
                 backend: "cpu",
                 adapter: cpu_model(),
-                driver: format!("{} threads, {}", rayon::current_num_threads(), std::env::consts::ARCH),
+                driver: format!("{} threads, {:?}", rayon::current_num_threads(), pulp::Arch::new()),
                 capabilities: Capabilities {
                     max_texture_3d: u32::MAX,
                     max_image: MAX_IMAGE,
@@ -64,11 +69,16 @@ impl Backend for CpuBackend {
 
     fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
         check(plan)?;
+        if plan.visible.is_empty() || plan.domain.is_empty() {
+            return Ok(Frame { image: Image::transparent(plan.size()), timing: Timing::default() });
+        }
         let begin = Instant::now();
-        let empty = plan.visible.is_empty() || plan.domain.is_empty();
-        let image = if empty { Image::transparent(plan.size()) } else { dispatch(plan, Rendering)? };
-        let wall_ms = begin.elapsed().as_secs_f64() * 1e3;
-        Ok(Frame { image, timing: Timing { wall_ms, ..Timing::default() } })
+        self.detail = has_dark(&plan.transfer).then(|| Detail::of(plan, self.detail.take()));
+        let visible = self.detail.as_ref().map_or(&[][..], Detail::visible);
+        let upload_ms = milliseconds(begin);
+        let begin = Instant::now();
+        let image = dispatch(plan, visible, Rendering);
+        Ok(Frame { image, timing: Timing { upload_ms, wall_ms: milliseconds(begin), ..Timing::default() } })
     }
 
     fn evaluate(
@@ -78,7 +88,7 @@ impl Backend for CpuBackend {
         inputs: &[[f32; 4]],
     ) -> Result<Vec<[f32; 4]>, RenderError> {
         check(plan)?;
-        dispatch(plan, Evaluation { function, inputs })
+        Ok(dispatch(plan, &[], Evaluation { function, inputs }))
     }
 }
 
@@ -88,19 +98,19 @@ trait Work {
     fn run<const N: usize, S: Stored>(self, scene: &Scene<N, S>) -> Self::Output;
 }
 
-fn dispatch<W: Work>(plan: &FramePlan, work: W) -> Result<W::Output, RenderError> {
-    Ok(match plan.bricks.format() {
-        SampleFormat::Unorm8 => dispatch_side::<Unorm8, W>(plan, work),
-        SampleFormat::Unorm16 => dispatch_side::<Unorm16, W>(plan, work),
-        SampleFormat::Float32 => dispatch_side::<Float32, W>(plan, work),
-    })
+fn dispatch<W: Work>(plan: &FramePlan, visible: &[Parts], work: W) -> W::Output {
+    match plan.bricks.format() {
+        SampleFormat::Unorm8 => dispatch_side::<Unorm8, W>(plan, visible, work),
+        SampleFormat::Unorm16 => dispatch_side::<Unorm16, W>(plan, visible, work),
+        SampleFormat::Float32 => dispatch_side::<Float32, W>(plan, visible, work),
+    }
 }
 
-fn dispatch_side<S: Stored, W: Work>(plan: &FramePlan, work: W) -> W::Output {
+fn dispatch_side<S: Stored, W: Work>(plan: &FramePlan, visible: &[Parts], work: W) -> W::Output {
     match plan.bricks.side() {
-        BrickSide::S16 => work.run(&Scene::<16, S>::new(plan)),
-        BrickSide::S32 => work.run(&Scene::<32, S>::new(plan)),
-        BrickSide::S64 => work.run(&Scene::<64, S>::new(plan)),
+        BrickSide::S16 => work.run(&Scene::<16, S>::new(plan, visible)),
+        BrickSide::S32 => work.run(&Scene::<32, S>::new(plan, visible)),
+        BrickSide::S64 => work.run(&Scene::<64, S>::new(plan, visible)),
     }
 }
 
@@ -111,12 +121,37 @@ impl Work for Rendering {
     fn run<const N: usize, S: Stored>(self, scene: &Scene<N, S>) -> Image<f32> {
         let size = scene.plan.size();
         let mut image = Image::transparent(size);
-        image.pixels_mut().par_chunks_mut(size.x.max(1) as usize).enumerate().for_each(|(y, row)| {
-            for (x, pixel) in row.iter_mut().enumerate() {
-                *pixel = march::march(scene, &scene.plan.rays.ray(x as u32, y as u32));
-            }
-        });
+        let width = size.x.max(1) as usize;
+        let simd = pulp::Arch::new();
+        let bands = image.pixels_mut().par_chunks_mut(width * TILE).enumerate();
+        bands.for_each(|(band, pixels)| simd.dispatch(Band { scene, first_row: band * TILE, width, pixels }));
         image
+    }
+}
+
+/// Pixels along a tile's side: neighbouring rays read the same samples while they are in the cache.
+const TILE: usize = 8;
+
+/// [`TILE`] rows of the picture: all that is inlined below it is compiled once for each instruction set.
+struct Band<'a, const N: usize, S> {
+    scene: &'a Scene<'a, N, S>,
+    first_row: usize,
+    width: usize,
+    pixels: &'a mut [[f32; 4]],
+}
+
+impl<const N: usize, S: Stored> pulp::NullaryFnOnce for Band<'_, N, S> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        let n_rows = self.pixels.len() / self.width;
+        for tile in (0..self.width).step_by(TILE) {
+            let columns = tile..(tile + TILE).min(self.width);
+            for (y, x) in (0..n_rows).flat_map(|y| columns.clone().map(move |x| (y, x))) {
+                let ray = self.scene.plan.rays.ray(x as u32, (self.first_row + y) as u32);
+                self.pixels[y * self.width + x] = march::march(self.scene, &ray);
+            }
+        }
     }
 }
 
@@ -181,6 +216,15 @@ fn check(plan: &FramePlan) -> Result<(), RenderError> {
         return Err(RenderError::Unsupported { what: "draw a brick that the plan does not bring" });
     }
     Ok(())
+}
+
+/// Whether some values are invisible.
+fn has_dark(transfer: &TransferFunction) -> bool {
+    transfer.knots().iter().any(|k| k.extinction == 0.0)
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
 }
 
 /// The processor's name, as the operating system states it.

@@ -5,6 +5,7 @@ use brickfield_frame::{FramePlan, IndexEntry, SampleFormat};
 
 use super::brick::{Lanes, Nodes, Stored};
 use super::classify::Classifier;
+use super::detail::Parts;
 
 /// A plan whose bricks have N samples a side, stored as `S`.
 pub(super) struct Scene<'a, const N: usize, S> {
@@ -18,6 +19,8 @@ pub(super) struct Scene<'a, const N: usize, S> {
     pub(super) offset: f32,
     /// The stored number nearest to the first knot; 0 but for 16-bit ones.
     pub(super) bias: f32,
+    /// The visible parts of each brick; empty if that is not known.
+    pub(super) visible: &'a [Parts],
     stored: std::marker::PhantomData<S>,
 }
 
@@ -33,7 +36,7 @@ pub(super) struct Block {
 }
 
 impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
-    pub(super) fn new(plan: &'a FramePlan) -> Self {
+    pub(super) fn new(plan: &'a FramePlan, visible: &'a [Parts]) -> Self {
         let transfer = Classifier::new(&plan.transfer);
         let decode = plan.bricks.decode();
         let gain = decode.scale / S::FORMAT.unit();
@@ -49,6 +52,7 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
             offset: (bias * gain + decode.offset - transfer.origin) as f32,
             bias: bias as f32,
             transfer,
+            visible,
             stored: std::marker::PhantomData,
         }
     }

@@ -3,7 +3,7 @@
 use brickfield_optics::QuadratureRule;
 
 use super::classify::{Classifier, Optics32};
-use super::scalar::{alpha, depth};
+use super::scalar::{alpha, depth, exp_minus};
 
 /// Depth, opacity and emission of a segment.
 #[derive(Clone, Copy, Debug, Default)]
@@ -83,7 +83,7 @@ fn gauss2(near: Optics32, far: Optics32, length: f32) -> Segment32 {
         return Segment32::default();
     }
     let depth = 0.5 * length * total;
-    let far_weight = far.extinction * (-depth / 3f32.sqrt()).exp();
+    let far_weight = far.extinction * exp_minus(depth * (1.0 / 3f32.sqrt()));
     let weight = near.extinction + far_weight;
     let share = if weight > 0.0 { near.extinction / weight } else { 0.0 };
     let a = alpha(depth);
