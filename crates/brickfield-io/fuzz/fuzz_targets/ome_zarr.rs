@@ -5,7 +5,10 @@ use std::collections::BTreeMap;
 use brickfield_io::{Limits, ome_zarr};
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|bytes: &[u8]| {
+#[path = "panics.rs"]
+mod panics;
+
+fuzz_target!(init: panics::abort_on_ours(), |bytes: &[u8]| {
     let _ = ome_zarr::read_entries(&entries(bytes), &Limits { max_bytes: 1 << 20 });
 });
 
