@@ -25,7 +25,8 @@ impl Atlas {
         let format = format(device, bricks.format())?;
         let texels = shape.texels();
         let size = wgpu::Extent3d { width: texels.x, height: texels.y, depth_or_array_layers: texels.z };
-        let n_bytes = u64::from(texels.x) * u64::from(texels.y) * u64::from(texels.z) * bricks.format().n_bytes() as u64;
+        let n_bytes =
+            u64::from(texels.x) * u64::from(texels.y) * u64::from(texels.z) * bricks.format().n_bytes() as u64;
         device.checked("the brick atlas", n_bytes, || {
             let texture = device.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("atlas"),

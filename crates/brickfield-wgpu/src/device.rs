@@ -46,8 +46,8 @@ impl Device {
             memory_hints: wgpu::MemoryHints::default(),
             trace: wgpu::Trace::Off,
         }));
-        let (device, queue) = opened
-            .map_err(|e| OpenError::NoDevice { adapter: info.name.clone(), message: e.to_string() })?;
+        let (device, queue) =
+            opened.map_err(|e| OpenError::NoDevice { adapter: info.name.clone(), message: e.to_string() })?;
         let description = Description {
             backend: "wgpu",
             driver: driver(&info),

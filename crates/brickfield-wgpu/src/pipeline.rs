@@ -54,8 +54,8 @@ fn from_shader(device: &wgpu::Device, shader: Specialised) -> Pipeline {
     let entry_point = shader.entry_point();
     let filtered = shader.bindings.iter().any(|b| b.kind == BindingKind::Sampler);
     let entries: Vec<_> = shader.bindings.iter().map(|b| entry(b, filtered)).collect();
-    let layout =
-        device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(entry_point), entries: &entries });
+    let layout = device
+        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(entry_point), entries: &entries });
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(entry_point),
         bind_group_layouts: &[Some(&layout)],
