@@ -27,7 +27,9 @@ pub enum WorldFrame {
     /// Every format that states an anatomical frame is brought to this one: of NIfTI, and of NRRD files in
     /// right-anterior-superior, x and y are negated.
     Lps,
-    /// The axes mean what the file's author meant: VTK, TIFF, OME-Zarr, raw, and files without orientation.
+    /// A stack of pictures: +x to the right, +y down, +z into the stack (TIFF, OME-Zarr).
+    Pictures,
+    /// The axes mean what the file's author meant: VTK, raw, and files without orientation.
     Plain,
 }
 
@@ -42,6 +44,10 @@ pub(crate) struct Found {
 impl Found {
     pub(crate) fn plain(format: Format) -> Found {
         Found { format, frame: WorldFrame::Plain, unit: None, notes: Vec::new() }
+    }
+
+    pub(crate) fn pictures(format: Format) -> Found {
+        Found { frame: WorldFrame::Pictures, ..Found::plain(format) }
     }
 
     pub(crate) fn finish(mut self, grid: Grid, voxels: Voxels) -> Result<Opened, ReadError> {

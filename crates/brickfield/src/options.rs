@@ -104,7 +104,7 @@ pub enum OptionError {
     #[error("--transfer: {0}")]
     Preset(#[from] brickfield_core::TransferError),
     #[error("--transfer: {0}")]
-    Transfer(#[from] brickfield_optics::TransferFileError),
+    Transfer(#[from] brickfield_optics::ReadTransferError),
     #[error("--transfer {name:?} is neither auto, nor a file, nor a preset; the presets are {presets}")]
     NoSuchTransfer { name: String, presets: String },
     #[error(transparent)]

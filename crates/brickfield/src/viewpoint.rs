@@ -152,6 +152,8 @@ fn side_directions(side: Side, frame: WorldFrame) -> (DVec3, DVec3) {
     let (right, back, up) = match frame {
         // +x is the patient's left, which is to the right of a viewer in front.
         WorldFrame::Lps => (DVec3::X, DVec3::Y, DVec3::Z),
+        // As the pictures of the stack are looked at.
+        WorldFrame::Pictures => (DVec3::X, DVec3::Z, -DVec3::Y),
         // Nothing is known: x to the right, z up.
         WorldFrame::Plain => (DVec3::X, DVec3::Y, DVec3::Z),
     };

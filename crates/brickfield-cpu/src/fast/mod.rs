@@ -44,7 +44,7 @@ impl CpuBackend {
             description: Description {
                 backend: "cpu",
                 adapter: cpu_model(),
-                driver: format!("{} threads, {:?}", rayon::current_num_threads(), pulp::Arch::new()),
+                driver: format!("{} threads, {}", rayon::current_num_threads(), instruction_set()),
                 capabilities: Capabilities {
                     max_texture_3d: u32::MAX,
                     max_image: MAX_IMAGE,
@@ -54,6 +54,12 @@ impl CpuBackend {
             },
         }
     }
+}
+
+/// The vector instructions that are used: `V3` is AVX2 with FMA, `Scalar` what every processor has.
+fn instruction_set() -> String {
+    let debug = format!("{:?}", pulp::Arch::new());
+    debug.split('(').next().unwrap_or_default().to_owned()
 }
 
 impl Default for CpuBackend {
@@ -202,11 +208,14 @@ fn evaluate<const N: usize, S: Stored>(
     }
 }
 
-/// Refuses pictures that are too large, and plans that name bricks they do not have.
+/// Refuses pictures that are too large, plans without samples, and plans that name bricks they do not have.
 fn check(plan: &FramePlan) -> Result<(), RenderError> {
     let size: UVec2 = plan.size();
     if size.max_element() > MAX_IMAGE {
         return Err(RenderError::ImageTooLarge { size, limit: MAX_IMAGE });
+    }
+    if plan.index.dims().min_element() == 0 || plan.dims.min_element() == 0 {
+        return Err(RenderError::Unsupported { what: "draw a volume without samples" });
     }
     let stranger = |w: &u32| match IndexEntry::unpack(*w) {
         IndexEntry::Resident { slot, .. } => slot >= plan.bricks.n_bricks(),

@@ -53,7 +53,7 @@ fn header(volume: &Volume, frame: WorldFrame, encoding: NrrdEncoding) -> String 
     let first_sample = map.transform_point3(DVec3::splat(0.5));
     let space = match frame {
         WorldFrame::Lps => "space: left-posterior-superior",
-        WorldFrame::Plain => "space dimension: 3",
+        WorldFrame::Pictures | WorldFrame::Plain => "space dimension: 3",
     };
     let encoding = match encoding {
         NrrdEncoding::Raw => "raw",

@@ -49,7 +49,7 @@ pub fn read_entries(entries: &BTreeMap<String, Vec<u8>>, limits: &Limits) -> Res
 }
 
 fn read_store(store: ReadableStorage, limits: &Limits) -> Result<Opened, ReadError> {
-    let mut found = Found::plain(Format::OmeZarr);
+    let mut found = Found::pictures(Format::OmeZarr);
     let image = Image::read(&store, &mut found.notes)?;
     let array = ArrayMetadata::read(&store, &image.path)?;
     let volume_axes = image.volume_axes(&array.shape, &mut found.notes)?;

@@ -39,7 +39,7 @@ fn read_from(source: &mut dyn ByteSource, limits: &Limits) -> Result<Opened, Rea
         return Err(ReadError::Empty);
     }
     let mut decoder = Decoder::new(source).map_err(fault)?.with_limits(header_limits());
-    let mut found = Found::plain(Format::Tiff);
+    let mut found = Found::pictures(Format::Tiff);
     let first = Page::read(&mut decoder)?;
     let description = Description::read(&decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap_or_default());
     let spacing = spacing(&mut decoder, &description);
