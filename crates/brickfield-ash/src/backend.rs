@@ -64,12 +64,7 @@ impl AshBackend {
         self.variants = Variants::new(library);
     }
 
-    /// What the validation layer said so far; empty if it was not asked for.
-    pub fn validation_messages(&self) -> Vec<String> {
-        self.validation_log().messages()
-    }
-
-    /// The same as a log that outlives the backend, to see what is said about its end.
+    /// What the validation layer says, as a log that outlives the backend, to see what is said about its end.
     pub fn validation_log(&self) -> ValidationLog {
         self.device.instance().log().clone()
     }
@@ -100,6 +95,10 @@ impl AshBackend {
 impl Backend for AshBackend {
     fn describe(&self) -> &Description {
         &self.description
+    }
+
+    fn validation_messages(&self) -> Vec<String> {
+        self.validation_log().messages()
     }
 
     fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {

@@ -10,6 +10,11 @@ pub trait Backend {
     /// What this backend is, and what it can do.
     fn describe(&self) -> &Description;
 
+    /// What the driver's validation layer said so far; empty where there is none, or it was not asked for.
+    fn validation_messages(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Renders a frame. What the plan shares with the last one (bricks, shader variant) stays on the device.
     ///
     /// # Errors

@@ -139,8 +139,12 @@ fn wgpu_adapters() -> Result<Vec<AdapterInfo>, String> {
 }
 
 #[cfg(feature = "wgpu")]
-fn open_wgpu(adapter: Option<&str>, _: Validation) -> Result<Box<dyn Backend>, BackendError> {
+fn open_wgpu(adapter: Option<&str>, validation: Validation) -> Result<Box<dyn Backend>, BackendError> {
     use brickfield_wgpu::{AdapterChoice, WgpuBackend};
+    if validation == Validation::On {
+        let reason = "the driver's validation layer is asked through ash; wgpu checks its calls itself".to_owned();
+        return Err(BackendError::Unavailable { kind: BackendKind::Wgpu, reason });
+    }
     let choice = choose(adapter, AdapterChoice::Default, AdapterChoice::Index, AdapterChoice::Name);
     let backend = WgpuBackend::new(&choice).map_err(|e| unavailable(BackendKind::Wgpu, &e))?;
     Ok(Box::new(backend))

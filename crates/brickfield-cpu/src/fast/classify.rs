@@ -61,9 +61,10 @@ impl Classifier {
         self.on(self.stretch(value), value)
     }
 
-    /// The stretch that a value lies in.
+    /// The stretch that a value lies in; infinity and NaN are in the last.
     #[inline(always)]
     pub(super) fn stretch(&self, value: f32) -> usize {
+        let value = value.min(f32::MAX);
         let bin = (value * self.bins_per_value).clamp(0.0, (N_BINS - 1) as f32) as usize;
         let mut i = self.bins[bin & (N_BINS - 1)] as usize;
         while self.ends[i] <= value {

@@ -61,7 +61,7 @@ struct RenderArgs {
     /// Adapter: its number or a part of its name, as `brickfield backends` lists them
     #[arg(long)]
     adapter: Option<String>,
-    /// Check all calls by the driver's validation layer (wgpu, ash)
+    /// Check all calls by the driver's validation layer (ash); what it says is printed and fails the command
     #[arg(long)]
     validation: bool,
     #[command(flatten)]
@@ -78,6 +78,8 @@ struct RenderArgs {
 enum Failure {
     /// Status 3.
     Backend(brickfield::BackendError),
+    /// Status 1: the picture was written, but the validation layer had something to say.
+    Validation { n_messages: usize },
     /// Status 1.
     Other(Box<dyn std::error::Error>),
 }
@@ -102,6 +104,10 @@ fn main() -> ExitCode {
         Err(Failure::Backend(e)) => {
             eprintln!("brickfield: {e}");
             ExitCode::from(3)
+        }
+        Err(Failure::Validation { n_messages }) => {
+            eprintln!("brickfield: {n_messages} messages from the validation layer");
+            ExitCode::FAILURE
         }
         Err(Failure::Other(e)) => {
             eprintln!("brickfield: {}", one_line(&e.to_string()));

@@ -20,7 +20,12 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let attributes = attributes(args, backend.as_ref(), &scene);
     write_picture(&args.out, &frame.image, args.view.background.0, &attributes)?;
     print_summary(backend.as_ref(), &plan, &frame);
-    Ok(())
+    check_validation(&backend.validation_messages())
+}
+
+fn check_validation(messages: &[String]) -> Result<(), Failure> {
+    messages.iter().for_each(|m| eprintln!("validation: {m}"));
+    if messages.is_empty() { Ok(()) } else { Err(Failure::Validation { n_messages: messages.len() }) }
 }
 
 /// The first candidate that opens; the last one's error if none does.
