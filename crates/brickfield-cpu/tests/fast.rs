@@ -260,3 +260,24 @@ fn functions_equal_their_equations() {
         assert!(difference(got.map(f64::from), [o.color[0], o.color[1], o.color[2], o.extinction]) < 1e-6);
     }
 }
+
+/// Two levels that disagree at their common face, and a ray that runs along it: either side's colour is right, and the
+/// ambiguity says so.
+#[test]
+fn a_ray_along_a_face_between_levels_is_ambiguous_and_others_are_not() {
+    // Level 1 takes every other sample: it sees none of the odd ones.
+    let volume =
+        support::volume([61, 31, 31], DVec3::ONE, ScalarType::U8, |p| if p.y % 2.0 == 1.0 { 200.0 } else { 0.0 });
+    let tf = TransferFunction::new(vec![knot(0.0, 0.0, [1.0; 3]), knot(255.0, 0.5, [1.0; 3])]).unwrap();
+    let level = |cell: UVec3| u8::from(cell.x >= 2);
+    let picture = |x: f64| {
+        // The face between the levels lies at sample 30, index 30.5.
+        let eye = DVec3::new(x, 15.2, -20.0);
+        let camera = Camera::look_at(eye, eye + DVec3::Z, DVec3::Y, Projection::Orthographic { height: 4.0 }).unwrap();
+        discrete(&Setup { camera, level: &level, size: UVec2::ONE, ..Setup::new(&volume, tf.clone()) }.plan())
+    };
+    let (left, face, right) = (picture(30.4), picture(30.5), picture(30.6));
+    let jump = difference(left.image.at(0, 0), right.image.at(0, 0));
+    assert!(jump > 0.5 && face.ambiguity[0] >= jump, "{jump} {}", face.ambiguity[0]);
+    assert_eq!((left.ambiguity[0], right.ambiguity[0]), (0.0, 0.0));
+}

@@ -2,8 +2,9 @@
 //!
 //! **Distance.** A position in f32 is anchor + direction (t - t_anchor), relative to the frame's centre. Each of its terms is
 //! the result of at most eight roundings (three products and two sums for the anchor, the same and a normalisation for
-//! the direction, a product and a sum for t), each of at most 2^-24 of the term. So along an axis a position is off by at
-//! most 8 * 2^-24 * (|anchor| + |direction| (|t| + |t_anchor|)), a few times the volume's extent times 5e-7.
+//! the direction, a product and a sum for t), each of at most 2^-24 of the term; and so is what shifts it to the first sample
+//! and divides it by the brick's cells. So along an axis a position is off by at most
+//! 8 * 2^-24 * (|center| + |anchor| + |direction| (|t| + |t_anchor|)), a few times the volume's extent times 5e-7.
 //!
 //! **Value.** The interpolated value moves by at most that distance times the range of its cell, and by eight more
 //! roundings of the numbers that decoding adds up.
@@ -13,20 +14,20 @@
 //! change one after the other; T is taken with the least depths that the segments before may have. The sum is a bound.
 
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Aabb, Span};
+use brickfield_core::{Aabb, Level, Span};
 use brickfield_frame::{FramePlan, IndexEntry, PlanRay};
 use brickfield_optics::{Segment, alpha, transmittance};
 
 use super::field::{Field, Stored};
 use super::walk::{Part, clip, segments};
-use super::{relative, segment};
+use super::{node_values, relative, segment};
 
 /// Roundings of a term, times the unit roundoff of f32.
 const ROUNDING: f64 = 8.0 / (1u32 << 24) as f64;
 
 /// What makes a plan's pixels ambiguous.
 pub(super) struct Ambiguity {
-    several_levels: bool,
+    several_kinds: bool,
     /// The values at which the transfer function jumps, ascending.
     jumps: Vec<f64>,
     /// The greatest extinction of the transfer function.
@@ -42,7 +43,7 @@ impl Ambiguity {
         let optics = |i: usize| (knots[i].extinction, knots[i].color);
         let jump = |i: &usize| knots[*i].value == knots[i + 1].value && optics(*i) != optics(i + 1);
         Ambiguity {
-            several_levels: has_several_levels(field.plan),
+            several_kinds: has_several_kinds(field.plan),
             jumps: (0..knots.len() - 1).filter(jump).map(|i| knots[i].value).collect(),
             max_extinction: knots.iter().map(|k| k.extinction).fold(0.0, f64::max),
         }
@@ -54,11 +55,11 @@ impl Ambiguity {
         let domain = relative(&plan.domain, plan.rays.center);
         let least = -plan.rays.start;
         let far = domain.extent().length() / ray.direction.length() + ray.t_anchor.abs();
-        let delta = distance(ray, far);
+        let delta = distance(plan, ray, far);
         match clip(ray, &domain, least) {
             Some(_) if clip(ray, &grown(&domain, -delta), least).is_none() => self.grazing(ray, &domain, delta, least),
             None => self.grazing(ray, &domain, delta, least),
-            Some(span) if self.several_levels || !self.jumps.is_empty() => self.inside(field, ray, span),
+            Some(span) if self.several_kinds || !self.jumps.is_empty() => self.inside(field, ray, span),
             Some(_) => 0.0,
         }
     }
@@ -70,16 +71,27 @@ impl Ambiguity {
 
     fn inside<S: Stored>(&self, field: &Field<S>, ray: &PlanRay, span: Span) -> f64 {
         let plan = field.plan;
-        let delta = distance(ray, span.start.abs().max(span.end.abs()));
+        let delta = distance(plan, ray, span.start.abs().max(span.end.abs()));
         let (mut bound, mut least_depth) = (0.0, 0.0);
+        let rule = plan.sampling.rule();
         for part in segments(span, plan.sampling.step_world()) {
-            let values = |x: &f64| self.values(field, plan.rays.center + ray.at(part.at(*x)), delta);
-            let nodes: Vec<Values> = plan.sampling.rule().nodes().iter().map(values).collect();
+            let at = |x: f64| plan.rays.center + ray.at(part.at(x));
+            if !rule.nodes().iter().any(|x| self.may_be_close(field, at(*x), delta)) {
+                least_depth += segment(plan, node_values(rule, |x| field.at(at(x))), part.length()).depth;
+                continue;
+            }
+            let nodes: Vec<Values> = rule.nodes().iter().map(|x| self.values(field, at(*x), delta)).collect();
             let (change, least) = spread(plan, &nodes, part);
             bound += transmittance(least_depth) * change;
             least_depth += least;
         }
         bound
+    }
+
+    /// Whether a node at `q` could be close to a jump; quick, and never wrongly no.
+    fn may_be_close<S: Stored>(&self, field: &Field<S>, q: DVec3, delta: DVec3) -> bool {
+        let q = field.clamped(q);
+        !self.jumps.is_empty() || field.index_cell(q - delta) != field.index_cell(q + delta)
     }
 
     /// The values that a node at `q` may have.
@@ -88,12 +100,12 @@ impl Ambiguity {
         let own = field.index_cell(q);
         let mut values = vec![field.in_block(own, q)];
         self.beyond_jumps(field, own, q, delta, &mut values);
-        if !self.several_levels {
+        if !self.several_kinds {
             return values;
         }
-        let level = field.plan.index.at(own).level();
+        let kind = |c: UVec3| Kind::of(field.plan.index.at(c));
         let (low, high) = (field.index_cell(q - delta), field.index_cell(q + delta));
-        for cell in cells(low, high).filter(|c| field.plan.index.at(*c).level() != level) {
+        for cell in cells(low, high).filter(|c| kind(*c) != kind(own)) {
             values.push(field.in_block(cell, q));
             self.beyond_jumps(field, cell, q, delta, &mut values);
         }
@@ -116,18 +128,35 @@ impl Ambiguity {
 }
 
 /// How far a position of the ray may be off along each axis, in voxels, for parameters up to `far`.
-fn distance(ray: &PlanRay, far: f64) -> DVec3 {
-    (ray.anchor.abs() + ray.direction.abs() * (far + ray.t_anchor.abs())) * ROUNDING
+fn distance(plan: &FramePlan, ray: &PlanRay, far: f64) -> DVec3 {
+    (plan.rays.center.abs() + ray.anchor.abs() + ray.direction.abs() * (far + ray.t_anchor.abs())) * ROUNDING
 }
 
 fn grown(b: &Aabb, delta: DVec3) -> Aabb {
     Aabb { min: b.min - delta, max: b.max + delta }
 }
 
-fn has_several_levels(plan: &FramePlan) -> bool {
-    let mut levels = plan.index.words().iter().map(|w| IndexEntry::unpack(*w).level());
-    let first = levels.next();
-    levels.any(|l| Some(l) != first)
+/// What the field is like in a block. Where the kind changes it may jump: a transparent block does not say of which level
+/// its bricks were.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Resident(Level),
+    Transparent,
+}
+
+impl Kind {
+    fn of(entry: IndexEntry) -> Kind {
+        match entry {
+            IndexEntry::Resident { level, .. } => Kind::Resident(level),
+            IndexEntry::Transparent { .. } => Kind::Transparent,
+        }
+    }
+}
+
+fn has_several_kinds(plan: &FramePlan) -> bool {
+    let mut kinds = plan.index.words().iter().map(|w| Kind::of(IndexEntry::unpack(*w)));
+    let first = kinds.next();
+    kinds.any(|k| Some(k) != first)
 }
 
 fn cells(low: UVec3, high: UVec3) -> impl Iterator<Item = UVec3> {
