@@ -2,13 +2,14 @@
 
 use std::io::SeekFrom;
 
-use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry, VirtualVr};
+use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::{Tag, VR};
 use dicom_dictionary_std::StandardDataDictionary;
 
 use crate::ReadError;
 use crate::files::{ByteSource, n_bytes_left};
 use crate::samples::fill;
+use crate::stored::check_length;
 
 /// How elements are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,7 +29,7 @@ const PIXEL_DATA: (u16, u16) = (0x7fe0, 0x0010);
 struct Header {
     tag: (u16, u16),
     length: u32,
-    is_sequence: bool,
+    vr: VR,
 }
 
 /// Deeper sequences than this are refused: the parser descends into them on the stack.
@@ -53,7 +54,7 @@ pub(super) fn check_lengths(source: &mut dyn ByteSource, syntax: Syntax) -> Resu
         }
         let is_pixel_data = header.tag == PIXEL_DATA;
         let is_item_of_elements = header.tag == ITEM && !in_pixel_items;
-        if header.is_sequence || header.length == UNDEFINED || is_item_of_elements {
+        if header.vr == VR::SQ || header.length == UNDEFINED || is_item_of_elements {
             in_pixel_items |= is_pixel_data;
             nest.enter(&header, n_left)?;
             continue;
@@ -98,12 +99,16 @@ impl Nest {
 }
 
 fn check_element_length(header: &Header, n_left: u64) -> Result<(), ReadError> {
-    if u64::from(header.length) <= n_left {
+    let value_bytes = value_bytes(header.vr);
+    let expected = if u64::from(header.length) > n_left {
+        format!("at most the {n_left} bytes left")
+    } else if !header.length.is_multiple_of(value_bytes) {
+        format!("a multiple of {value_bytes}")
+    } else {
         return Ok(());
-    }
+    };
     let (group, element) = header.tag;
-    let field = format!("length of element ({group:04x},{element:04x})");
-    Err(ReadError::field(field, header.length, format!("at most the {n_left} bytes left")))
+    Err(ReadError::field(format!("length of element ({group:04x},{element:04x})"), header.length, expected))
 }
 
 fn skip(source: &mut dyn ByteSource, n_bytes: u64) -> Result<(), ReadError> {
@@ -127,46 +132,57 @@ fn read_header(source: &mut dyn ByteSource, syntax: Syntax) -> Result<Option<(He
         _ => u32::from_le_bytes(x),
     };
     if tag.0 == ITEM.0 {
-        return Ok(Some((Header { tag, length: long([e, f, g, h]), is_sequence: false }, 8)));
+        return Ok(Some((Header { tag, length: long([e, f, g, h]), vr: VR::UN }, 8)));
     }
     if syntax == Syntax::Implicit {
         let length = long([e, f, g, h]);
-        return Ok(Some((Header { tag, length, is_sequence: is_standard_sequence(tag) }, 8)));
+        return Ok(Some((Header { tag, length, vr: standard_vr(tag) }, 8)));
     }
-    let vr = [e, f];
-    if !has_long_form(vr) {
-        return Ok(Some((Header { tag, length: u32::from(short(g, h)), is_sequence: false }, 8)));
+    let vr = VR::from_binary([e, f]).unwrap_or(VR::UN);
+    if has_short_form([e, f]) {
+        return Ok(Some((Header { tag, length: u32::from(short(g, h)), vr }, 8)));
     }
     let mut length = [0; 4];
     if fill(source, &mut length).map_err(|e| ReadError::io("the data set", e))? < 4 {
         return Ok(None);
     }
-    Ok(Some((Header { tag, length: long(length), is_sequence: &vr == b"SQ" }, 12)))
+    Ok(Some((Header { tag, length: long(length), vr }, 12)))
 }
 
-/// Value representations whose length has 32 bits (PS3.5, 7.1.2).
-fn has_long_form(vr: [u8; 2]) -> bool {
-    matches!(&vr, b"OB" | b"OD" | b"OF" | b"OL" | b"OV" | b"OW" | b"SQ" | b"SV" | b"UC" | b"UN" | b"UR" | b"UT" | b"UV")
+/// Value representations whose length has 16 bits (PS3.5, 7.1.2). Unknown ones have the long form, as the parser has it.
+fn has_short_form(vr: [u8; 2]) -> bool {
+    const SHORT: &[u8] = b"AE AS AT CS DA DS DT FL FD IS LO LT PN SH SL SS ST TM UI UL US";
+    SHORT.chunks(3).any(|known| known[..2] == vr)
 }
 
-/// Where value representations are implicit, the dictionary tells which elements are sequences.
-fn is_standard_sequence((group, element): (u16, u16)) -> bool {
-    let entry = StandardDataDictionary.by_tag(Tag(group, element));
-    entry.is_some_and(|e| e.vr() == VirtualVr::Exact(VR::SQ))
+/// What the dictionary has, where value representations are implicit.
+fn standard_vr((group, element): (u16, u16)) -> VR {
+    StandardDataDictionary.by_tag(Tag(group, element)).map_or(VR::UN, |e| e.vr().relaxed())
+}
+
+/// Bytes of one value; the parser passes over whole values only, and would take up the rest as elements.
+fn value_bytes(vr: VR) -> u32 {
+    match vr {
+        VR::OW | VR::SS | VR::US => 2,
+        VR::AT | VR::FL | VR::OF | VR::OL | VR::SL | VR::UL => 4,
+        VR::FD | VR::OD | VR::OV | VR::SV | VR::UV => 8,
+        _ => 1,
+    }
 }
 
 /// Reads the file meta group (always explicit, little-endian): its transfer syntax. The source is then at the data set.
+///
+/// The group ends where its length says, as the parser has it; else both would not see the same elements.
 pub(super) fn read_transfer_syntax(source: &mut dyn ByteSource) -> Result<String, ReadError> {
     let fault = |e| ReadError::io("the file meta group", e);
     source.seek(SeekFrom::Start(PREAMBLE_BYTES)).map_err(fault)?;
+    let mut n_group_bytes = read_group_length(source)?;
     let mut uid = None;
-    while let Some((header, n_header_bytes)) = read_header(source, Syntax::ExplicitLittle)? {
-        if header.tag.0 != 2 {
-            source.seek_relative(-(n_header_bytes as i64)).map_err(fault)?;
-            break;
-        }
-        let n_left = n_bytes_left(source)?;
-        check_element_length(&header, n_left)?;
+    while n_group_bytes > 0 {
+        let missing = ReadError::Missing { field: "the end of the file meta group" };
+        let (header, n_header_bytes) = read_header(source, Syntax::ExplicitLittle)?.ok_or(missing)?;
+        check_element_length(&header, n_bytes_left(source)?)?;
+        n_group_bytes = n_group_bytes.saturating_sub(n_header_bytes + u64::from(header.length));
         if header.tag == (2, 0x10) && header.length <= MAX_UID_BYTES {
             let mut value = vec![0; header.length as usize];
             fill(source, &mut value).map_err(fault)?;
@@ -176,6 +192,17 @@ pub(super) fn read_transfer_syntax(source: &mut dyn ByteSource) -> Result<String
         }
     }
     uid.ok_or(ReadError::Missing { field: "TransferSyntaxUID" })
+}
+
+fn read_group_length(source: &mut dyn ByteSource) -> Result<u64, ReadError> {
+    let mut value = [0; 4];
+    match read_header(source, Syntax::ExplicitLittle)? {
+        Some((Header { tag: (2, 0), length: 4, .. }, _)) => {}
+        _ => return Err(ReadError::Missing { field: "FileMetaInformationGroupLength" }),
+    }
+    let n = fill(source, &mut value).map_err(|e| ReadError::io("the file meta group", e))?;
+    check_length("the file meta group", n as u64, 4)?;
+    Ok(u64::from(u32::from_le_bytes(value)))
 }
 
 const PREAMBLE_BYTES: u64 = 132;

@@ -279,6 +279,16 @@ fn lengths_beyond_the_file_are_refused_before_they_are_allocated() {
     ];
     let fault = read(nested.concat()).unwrap_err().to_string();
     assert_eq!(fault, "nesting of sequences is \"33\"; expected at most 32");
+    // Found by fuzzing: to the parser, an unknown representation has a length of 32 bits.
+    let at = whole.windows(4).position(|w| w == b"\x20\0\x32\0").unwrap() + 4;
+    let mut unknown = whole.clone();
+    unknown[at..at + 2].copy_from_slice(b"D\xa8");
+    let fault = read(unknown).unwrap_err().to_string();
+    assert!(fault.starts_with("length of element (0020,0032) is \"844902449\""), "{fault}");
+    // A group length that is too short would make meta elements part of the data set.
+    let mut short = whole.clone();
+    short[140..144].copy_from_slice(&[0; 4]);
+    assert_eq!(read(short).unwrap_err().to_string(), "TransferSyntaxUID is missing");
     let mut huge = whole.clone();
     let at = whole.len() - 12 - 4;
     huge[at..at + 4].copy_from_slice(&0xffff_fff0u32.to_le_bytes());
