@@ -1,7 +1,11 @@
 //! How Brickfield is held to its numbers: analytic volumes, metrics, comparisons against the f64 answer, and reports.
 //!
-//! Unpublished.
+//! Unpublished. `compare` (binary) renders a scene on every backend and reports error against run time; `conformance` holds
+//! every backend to the f64 answer, and its own cases to mutants; `orders` prints observed orders of accuracy; `speed` times.
 
+pub mod compare;
+pub mod conformance;
 pub mod metrics;
+pub mod orders;
 pub mod report;
 pub mod volumes;

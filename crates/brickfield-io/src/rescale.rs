@@ -4,11 +4,11 @@ use brickfield_core::ScalarType;
 #[cfg(feature = "nifti")]
 use brickfield_core::{Scalar, Voxels, with_voxels};
 
-#[cfg(feature = "nifti")]
-use crate::limits::{Limits, check_bytes};
 use crate::Note;
 #[cfg(feature = "nifti")]
 use crate::ReadError;
+#[cfg(feature = "nifti")]
+use crate::limits::{Limits, check_bytes};
 
 /// value = slope * stored + intercept.
 #[derive(Clone, Copy, Debug, PartialEq)]

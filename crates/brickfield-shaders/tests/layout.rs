@@ -4,7 +4,7 @@ use std::mem::{offset_of, size_of};
 
 use brickfield_frame::{FeatureSet, FrameUniforms, KnotUniform, QuadratureRule};
 use brickfield_shaders::naga::{Module, TypeInner};
-use brickfield_shaders::{Entry, Variant, specialise};
+use brickfield_shaders::{Entry, KnotSearch, Variant, specialise};
 
 macro_rules! host {
     ($t:ty, $($member:ident),*) => { (vec![$((stringify!($member), offset_of!($t, $member))),*], size_of::<$t>()) };
@@ -25,8 +25,12 @@ fn assert_equal(module: &Module, name: &str, (members, size): (Vec<(&str, usize)
 
 #[test]
 fn host_and_shader_structs_have_the_same_layout() {
-    let variant =
-        Variant { features: FeatureSet::all(), rule: QuadratureRule::MidpointExponential, entry: Entry::March };
+    let variant = Variant {
+        features: FeatureSet::all(),
+        rule: QuadratureRule::MidpointExponential,
+        search: KnotSearch::Unrolled(2),
+        entry: Entry::March,
+    };
     let module = specialise(&variant).unwrap().module;
     #[rustfmt::skip]
     assert_equal(&module, "Frame", host!(FrameUniforms, anchor, anchor_right, anchor_down, direction, direction_right,

@@ -1,7 +1,9 @@
 //! Every variant compiles, and holds nothing that it does not need.
 
 use brickfield_frame::{Feature, FeatureSet, QuadratureRule, ShaderFunction};
-use brickfield_shaders::{BindingKind, Entry, Specialised, Variant, specialise};
+use brickfield_shaders::{BindingKind, Entry, KnotSearch, Specialised, Variant, specialise};
+
+const SEARCH: KnotSearch = KnotSearch::Unrolled(2);
 
 fn feature_sets() -> impl Iterator<Item = FeatureSet> {
     (0..1u32 << Feature::ALL.len())
@@ -9,7 +11,7 @@ fn feature_sets() -> impl Iterator<Item = FeatureSet> {
 }
 
 fn march(features: FeatureSet, rule: QuadratureRule) -> Specialised {
-    specialise(&Variant { features, rule, entry: Entry::March })
+    specialise(&Variant { features, rule, search: SEARCH, entry: Entry::March })
         .unwrap_or_else(|e| panic!("{features:?} {rule:?}: {e}"))
 }
 
@@ -33,10 +35,25 @@ fn every_variant_of_every_function_compiles() {
     for features in feature_sets() {
         for rule in QuadratureRule::ALL {
             for function in ShaderFunction::ALL {
-                let variant = Variant { features, rule, entry: Entry::Evaluate(function) };
+                let variant = Variant { features, rule, search: SEARCH, entry: Entry::Evaluate(function) };
                 let shader = specialise(&variant).unwrap_or_else(|e| panic!("{variant:?}: {e}"));
                 assert!(shader.bindings.iter().any(|b| b.index == 7 && b.kind == BindingKind::StorageReadWrite));
             }
+        }
+    }
+}
+
+#[test]
+fn every_search_compiles_and_only_the_last_loops() {
+    let features = FeatureSet::default().with(Feature::TransferLookup);
+    let classify = Entry::Evaluate(ShaderFunction::Classify);
+    for search in KnotSearch::all() {
+        for (rule, entry) in
+            [(QuadratureRule::MidpointExponential, classify), (QuadratureRule::PreIntegrated, Entry::March)]
+        {
+            let shader =
+                specialise(&Variant { features, rule, search, entry }).unwrap_or_else(|e| panic!("{search:?}: {e}"));
+            assert!(entry == Entry::March || shader.wgsl.contains("for (") == (search == KnotSearch::Loop));
         }
     }
 }
@@ -75,7 +92,7 @@ fn functions_bind_what_they_read() {
     let bindings = |function| {
         let rule = QuadratureRule::Gauss2;
         let features = FeatureSet::default().with(Feature::TransferLookup);
-        indices(&specialise(&Variant { features, rule, entry: Entry::Evaluate(function) }).unwrap())
+        indices(&specialise(&Variant { features, rule, search: SEARCH, entry: Entry::Evaluate(function) }).unwrap())
     };
     assert_eq!(bindings(ShaderFunction::Alpha), [6, 7]);
     assert_eq!(bindings(ShaderFunction::Classify), [0, 4, 6, 7]);

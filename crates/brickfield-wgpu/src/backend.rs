@@ -8,7 +8,9 @@ use brickfield_frame::{
     AtlasShape, Backend, Description, Feature, Frame, FramePlan, FrameUniforms, KnotUniform, RenderError,
     ShaderFunction, Timing,
 };
-use brickfield_shaders::{Entry, ShaderLibrary, Variant, shader_inputs, shader_outputs};
+use brickfield_shaders::{
+    Entry, LLVMPIPE_LOOP_ROUNDS, ShaderLibrary, Variant, loop_rounds, shader_inputs, shader_outputs,
+};
 use wgpu::{BufferUsages, Features};
 
 use crate::atlas::{self, Atlas};
@@ -86,6 +88,16 @@ impl WgpuBackend {
         Ok(())
     }
 
+    fn check_loops(&self, plan: &FramePlan) -> Result<(), RenderError> {
+        let counts = self.device.description.adapter.contains("llvmpipe");
+        if counts && loop_rounds(plan) > LLVMPIPE_LOOP_ROUNDS {
+            return Err(RenderError::Unsupported {
+                what: "take so many steps on a ray: llvmpipe ends all loops after 65,535 rounds",
+            });
+        }
+        Ok(())
+    }
+
     fn check_features(&self, plan: &FramePlan) -> Result<(), RenderError> {
         let filtered_floats = plan.features.contains(Feature::HardwareFilter)
             && plan.bricks.format() == brickfield_frame::SampleFormat::Float32;
@@ -133,6 +145,7 @@ impl Backend for WgpuBackend {
             return Ok(Frame { image: Image::transparent(size), timing: Timing::default() });
         }
         self.check_features(plan)?;
+        self.check_loops(plan)?;
         let started = Instant::now();
         let pipeline = self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?;
         self.scene.update(&self.device, plan, pipeline)?;

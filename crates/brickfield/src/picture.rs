@@ -79,9 +79,9 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &[(&str, String)]) -> R
     }
     let channels = exr_format::SpecificChannels::rgba(pixel);
     let layer = exr_format::Layer::new(size, layer, exr_format::Encoding::FAST_LOSSLESS, channels);
-    atomically(path, |mut file| {
+    atomically(path, |file| {
         let image = exr_format::Image::from_layer(layer);
-        image.write().to_buffered(&mut file).map_err(|source| PictureError::Exr { path: path.to_owned(), source })
+        image.write().to_buffered(file).map_err(|source| PictureError::Exr { path: path.to_owned(), source })
     })
 }
 

@@ -8,8 +8,7 @@ mod plot;
 mod slope;
 mod table;
 
-use std::collections::BTreeSet;
-
+use brickfield_optics::QuadratureRule;
 use serde::{Deserialize, Serialize};
 
 pub use front::{Cost, mark_front, on_front};
@@ -170,7 +169,7 @@ pub struct LeftOut {
 }
 
 /// What the points of one curve share.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub struct CurveKey {
     pub mode: String,
@@ -187,10 +186,25 @@ impl Row {
     }
 }
 
+impl CurveKey {
+    fn rank(&self) -> (String, usize, usize, String) {
+        let rules = QuadratureRule::ALL.map(|r| r.name());
+        let place = |list: &[&str], name: &str| list.iter().position(|n| *n == name).unwrap_or(list.len());
+        let backend = place(&["cpu", "wgpu", "ash"], &self.backend);
+        (self.mode.clone(), place(&rules, &self.rule), backend, self.adapter.clone())
+    }
+}
+
 impl Report {
-    /// The curves, each with its rows from the largest step to the smallest.
+    /// The curves, by mode, rule (coarsest first) and backend, each with its rows from the largest step to the smallest.
     pub fn curves(&self) -> Vec<(CurveKey, Vec<&Row>)> {
-        let keys: BTreeSet<CurveKey> = self.rows.iter().map(Row::curve).collect();
+        let mut keys: Vec<CurveKey> = Vec::new();
+        for key in self.rows.iter().map(Row::curve) {
+            if !keys.contains(&key) {
+                keys.push(key);
+            }
+        }
+        keys.sort_by_key(CurveKey::rank);
         let rows = |key: &CurveKey| {
             let mut rows: Vec<&Row> = self.rows.iter().filter(|r| r.curve() == *key).collect();
             rows.sort_by(|a, b| b.step_voxels.total_cmp(&a.step_voxels));

@@ -1,6 +1,6 @@
 //! The report as one page that needs nothing but itself: no server, no network, no fonts.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::io;
 use std::path::Path;
@@ -82,7 +82,7 @@ fn facts(report: &Report) -> String {
     let s = &report.scene;
     let by = |n: &[String]| n.join(" x ");
     let dims = by(&s.dims.map(|n| n.to_string()));
-    let spacing = by(&s.spacing.map(|x| x.to_string()));
+    let spacing = by(&s.spacing.map(|x| format!("{}", (x * 1e6).round() / 1e6)));
     let m = &report.machine;
     let mut facts = vec![
         (
@@ -125,14 +125,21 @@ fn absent(report: &Report) -> String {
 
 fn filters(report: &Report) -> String {
     let keys: Vec<CurveKey> = report.curves().into_iter().map(|c| c.0).collect();
-    let set = |of: fn(&CurveKey) -> &String| keys.iter().map(of).cloned().collect::<BTreeSet<String>>();
+    let set = |of: fn(&CurveKey) -> &String| {
+        keys.iter().map(of).fold(Vec::new(), |mut seen: Vec<String>, v| {
+            if !seen.contains(v) {
+                seen.push(v.clone());
+            }
+            seen
+        })
+    };
     let rule = |name: &str| format!("<rect y=\"5\" width=\"22\" height=\"4\" fill=\"{}\"/>", rule_color(name));
     let backend = |name: &str| marker(name, (11, 7), "#444", "#444", name);
     let mode = |name: &str| {
         let dash = if name == "fast" { " stroke-dasharray=\"5 3\"" } else { "" };
         format!("<line x2=\"22\" y1=\"7\" y2=\"7\" stroke=\"#444\" stroke-width=\"2\"{dash}/>")
     };
-    let fieldset = |name: &str, values: BTreeSet<String>, swatch: &dyn Fn(&str) -> String| {
+    let fieldset = |name: &str, values: Vec<String>, swatch: &dyn Fn(&str) -> String| {
         let label = |v: &String| {
             let swatch = swatch(v);
             format!(

@@ -239,7 +239,7 @@ fn guides(xs: (f64, f64), ys: (f64, f64), place: &dyn Fn((f64, f64)) -> (i32, i3
         let ((x1, y1), (x2, y2)) = (place((low, at(low))), place((xs.1, ys.1)));
         let _ = writeln!(
             svg,
-            "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\" stroke=\"#9aa3af\" stroke-dasharray=\"2 5\"/><text x=\"{}\" y=\"{}\" font-size=\"13\" fill=\"#7b8494\">order {order}</text>",
+            "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\" stroke=\"#9aa3af\" stroke-dasharray=\"2 5\"/><text x=\"{}\" y=\"{}\" font-size=\"13\" fill=\"#7b8494\" stroke=\"#fff\" stroke-width=\"4\" paint-order=\"stroke\">order {order}</text>",
             x1 + 8,
             y1 - 8
         );

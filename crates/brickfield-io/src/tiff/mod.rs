@@ -92,7 +92,11 @@ impl Page {
             (SampleFormat::IEEEFP, 32) => ScalarType::F32,
             (SampleFormat::IEEEFP, 64) => ScalarType::F64,
             _ => {
-                return Err(ReadError::unsupported("sample type", format!("{format:?} of {bits} bits"), crate::SCALARS));
+                return Err(ReadError::unsupported(
+                    "sample type",
+                    format!("{format:?} of {bits} bits"),
+                    crate::SCALARS,
+                ));
             }
         };
         Ok(Page { width, height, scalar })

@@ -1,5 +1,8 @@
 //! Plans made by hand: a field, its bricks, and a view of them.
 
+// A module of test programs: nothing outside can reach it.
+#![allow(unreachable_pub)]
+
 use std::sync::Arc;
 
 use brickfield_core::glam::{DVec3, UVec2, UVec3};

@@ -1,0 +1,274 @@
+//! Speed, in one alternating run: contestants take turns, so that whatever else the machine does befalls all alike.
+//!
+//! Times are printed, not asserted, unless `--check` is given: then the ratios that the project promises must hold.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::Context;
+use brickfield::bricks::{BrickTree, BuildOptions, Downsampling, build_tree};
+use brickfield::cpu::discrete;
+use brickfield::frame::{Backend, FramePlan, Mode};
+use brickfield::io::{Limits, open};
+use brickfield::optics::automatic;
+use brickfield::{BackendKind, Residency, Scene, Skipping, Validation, Viewpoint, open_backend, prepare};
+use brickfield_conformance::conformance::Tolerance;
+use brickfield_conformance::metrics::median;
+use brickfield_core::glam::{DVec3, UVec2, UVec3};
+use brickfield_core::{BrickSide, Grid, Image, TransferFunction, Volume};
+use clap::Parser;
+use serde::Serialize;
+
+/// Times skipping, brick sides, backends, an empty frame and the octree's build, contestants alternating
+#[derive(Parser)]
+struct Options {
+    /// The folder of real volumes
+    #[arg(long, env = "BRICKFIELD_DATA", value_name = "FOLDER")]
+    data: PathBuf,
+    /// Rounds; every contestant runs once a round
+    #[arg(long, default_value_t = 7)]
+    rounds: usize,
+    /// Side of the picture in pixels
+    #[arg(long, default_value_t = 512)]
+    size: u32,
+    /// A part of the adapter's name, or its number
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Fail if a promised ratio is missed
+    #[arg(long)]
+    check: bool,
+    /// Write the table to this file
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// The times of one contestant, in milliseconds.
+#[derive(Clone, Debug, Serialize)]
+struct Times {
+    what: String,
+    backend: String,
+    median: f64,
+    min: f64,
+    max: f64,
+}
+
+/// A promise, and what was measured.
+#[derive(Clone, Debug, Serialize)]
+struct Promise {
+    what: String,
+    measured: f64,
+    at_least: f64,
+}
+
+#[derive(Default, Serialize)]
+struct Table {
+    times: Vec<Times>,
+    promises: Vec<Promise>,
+}
+
+/// A frame to be timed.
+struct Contestant {
+    what: String,
+    backend: usize,
+    plan: FramePlan,
+}
+
+type Backends = Vec<(BackendKind, Box<dyn Backend>)>;
+
+fn main() -> anyhow::Result<ExitCode> {
+    let options = Options::parse();
+    let mut table = Table::default();
+    let mut backends = opened(&options);
+    for (name, path, at_least) in [("engine", "ct/engine.vti", 2.0), ("aneurism", "ct/aneurism.vti", 4.0)] {
+        let volume = read(&options, path)?;
+        skipping(&options, name, at_least, &volume, &mut backends, &mut table)?;
+        sides(&options, name, &volume, &mut backends, &mut table)?;
+    }
+    octree(&options, &mut table)?;
+    println!();
+    for p in &table.promises {
+        let verdict = if p.measured >= p.at_least { "" } else { "  MISSED" };
+        println!("{:<72} {:>9.2} (at least {}){verdict}", p.what, p.measured, p.at_least);
+    }
+    if let Some(path) = &options.json {
+        let text = serde_json::to_string_pretty(&table)?;
+        fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    let kept = table.promises.iter().all(|p| p.measured >= p.at_least);
+    Ok(if kept || !options.check { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn opened(options: &Options) -> Backends {
+    let mut backends = Backends::new();
+    for kind in BackendKind::ALL {
+        match open_backend(kind, options.adapter.as_deref(), Validation::Off) {
+            Ok(backend) => {
+                let d = backend.describe();
+                println!("{kind}: {}, {}", d.adapter, d.driver);
+                backends.push((kind, backend));
+            }
+            Err(e) => println!("{kind}: absent: {e}"),
+        }
+    }
+    backends
+}
+
+fn read(options: &Options, path: &str) -> anyhow::Result<Volume> {
+    Ok(open(&options.data.join(path), &Limits::default())?.volume)
+}
+
+fn tree(volume: &Volume, side: BrickSide) -> anyhow::Result<BrickTree> {
+    Ok(build_tree(volume, &BuildOptions { side, downsampling: Downsampling::Average, max_bytes: None })?)
+}
+
+fn scene(options: &Options, volume: &Volume, mode: Mode, skipping: Skipping) -> anyhow::Result<Scene> {
+    let size = UVec2::splat(options.size);
+    let camera = Viewpoint::default().camera(volume.grid(), brickfield::io::WorldFrame::Plain, size)?;
+    Ok(Scene { mode, skipping, step_voxels: 0.5, ..Scene::new(camera, size, automatic(volume)) })
+}
+
+/// Skipping on against off in fast mode and in exact mode, and a frame that shows nothing, on every backend.
+fn skipping(
+    options: &Options,
+    name: &str,
+    at_least: f64,
+    volume: &Volume,
+    backends: &mut Backends,
+    table: &mut Table,
+) -> anyhow::Result<()> {
+    let tree = tree(volume, BrickSide::S32)?;
+    let plan = |mode, skip| -> anyhow::Result<FramePlan> {
+        Ok(prepare(&tree, &scene(options, volume, mode, skip)?, &mut Residency::default())?)
+    };
+    let invisible = Scene {
+        transfer: TransferFunction::constant(0.0, [1.0; 3])?,
+        ..scene(options, volume, Mode::FAST, Skipping::On)?
+    };
+    let plans = [
+        ("fast, skipping", plan(Mode::FAST, Skipping::On)?),
+        ("fast, no skipping", plan(Mode::FAST, Skipping::Off)?),
+        ("exact, skipping", plan(Mode::Exact, Skipping::On)?),
+        ("nothing to see", prepare(&tree, &invisible, &mut Residency::default())?),
+    ];
+    let mut contestants = Vec::new();
+    for (what, plan) in &plans {
+        for backend in 0..backends.len() {
+            contestants.push(Contestant { what: format!("{name}, {what}"), backend, plan: plan.clone() });
+        }
+    }
+    let times = alternate(options, &contestants, backends)?;
+    for (kind, backend) in backends.iter_mut() {
+        let of = |what: &str| {
+            times
+                .iter()
+                .find(|t| t.backend == kind.name() && t.what == format!("{name}, {what}"))
+                .map_or(f64::NAN, |t| t.median)
+        };
+        table.promises.push(Promise {
+            what: format!("{name}, {kind}: without skipping / with, fast mode"),
+            measured: of("fast, no skipping") / of("fast, skipping"),
+            at_least,
+        });
+        table.promises.push(Promise {
+            what: format!("{name}, {kind}: 20 ms / a frame with nothing to see"),
+            measured: 20.0 / of("nothing to see").max(1e-3),
+            at_least: 1.0,
+        });
+        table.promises.push(equal_images(name, kind.name(), backend.as_mut(), &plans[0].1, &plans[1].1)?);
+    }
+    let of = |backend: &str| {
+        times.iter().find(|t| t.backend == backend && t.what == format!("{name}, fast, skipping")).map(|t| t.median)
+    };
+    if let (Some(cpu), Some(wgpu)) = (of("cpu"), of("wgpu")) {
+        let what = format!("{name}: wgpu's time / cpu's, fast mode, skipping");
+        table.promises.push(Promise { what, measured: wgpu / cpu, at_least: 0.7 });
+    }
+    table.times.extend(times);
+    Ok(())
+}
+
+/// Whether the pictures with and without skipping are within the rule: 1 if they are.
+fn equal_images(
+    name: &str,
+    backend_name: &str,
+    backend: &mut dyn Backend,
+    with: &FramePlan,
+    without: &FramePlan,
+) -> anyhow::Result<Promise> {
+    let reference = discrete(with);
+    let tolerance = Tolerance::of(with, &reference, &backend.describe().capabilities)?;
+    let holds = |image: &Image<f32>| tolerance.judge(image, &reference.image).complaint.is_none();
+    let both = [backend.render(with)?.image, backend.render(without)?.image];
+    let equal = both.iter().all(holds);
+    let what = format!("{name}, {backend_name}: pictures with and without skipping are within the rule");
+    Ok(Promise { what, measured: f64::from(u8::from(equal)), at_least: 1.0 })
+}
+
+/// Brick sides against each other.
+fn sides(
+    options: &Options,
+    name: &str,
+    volume: &Volume,
+    backends: &mut Backends,
+    table: &mut Table,
+) -> anyhow::Result<()> {
+    let mut contestants = Vec::new();
+    for side in BrickSide::ALL {
+        let tree = tree(volume, side)?;
+        let plan = prepare(&tree, &scene(options, volume, Mode::FAST, Skipping::On)?, &mut Residency::default())?;
+        println!(
+            "{name}, bricks of {side}: {} resident, {:.1} MB",
+            plan.bricks.n_bricks(),
+            plan.bricks.bytes().len() as f64 / 1e6
+        );
+        for backend in 0..backends.len() {
+            contestants.push(Contestant { what: format!("{name}, bricks of {side}"), backend, plan: plan.clone() });
+        }
+    }
+    table.times.extend(alternate(options, &contestants, backends)?);
+    Ok(())
+}
+
+/// Every contestant once a round. The first round warms up (uploads, shaders) and is not counted.
+fn alternate(options: &Options, contestants: &[Contestant], backends: &mut Backends) -> anyhow::Result<Vec<Times>> {
+    let mut ms = vec![Vec::new(); contestants.len()];
+    for round in 0..=options.rounds {
+        for (contestant, ms) in contestants.iter().zip(&mut ms) {
+            let backend = &mut backends[contestant.backend].1;
+            // A backend holds one set of bricks: the second frame in a row uploads nothing.
+            backend.render(&contestant.plan)?;
+            let timing = backend.render(&contestant.plan)?.timing;
+            if round > 0 {
+                ms.push(timing.wall_ms);
+            }
+        }
+    }
+    let times = |(c, ms): (&Contestant, Vec<f64>)| {
+        let (min, max) = ms.iter().fold((f64::INFINITY, 0.0f64), |m, t| (m.0.min(*t), m.1.max(*t)));
+        let t =
+            Times { what: c.what.clone(), backend: backends[c.backend].0.name().into(), median: median(ms), min, max };
+        println!("{:<32} {:<5} {:>9.2} ms  ({:.2} to {:.2})", t.what, t.backend, t.median, t.min, t.max);
+        t
+    };
+    Ok(contestants.iter().zip(ms).map(times).collect())
+}
+
+/// The octree of 512^3 voxels of 8 bits, in MB of voxels a second.
+fn octree(options: &Options, table: &mut Table) -> anyhow::Result<()> {
+    let n = 512usize;
+    let grid = Grid::axis_aligned(UVec3::splat(n as u32), DVec3::ONE)?;
+    let voxel = |i: usize| ((i % n) ^ (i / n % n) ^ (i / n / n)) as u8;
+    let volume = Volume::new(grid, (0..n * n * n).map(voxel).collect::<Vec<u8>>())?;
+    let mut rates = Vec::new();
+    for _ in 0..options.rounds.min(3) {
+        let begin = Instant::now();
+        let built = tree(&volume, BrickSide::S32)?;
+        rates.push((n * n * n) as f64 / 1e6 / begin.elapsed().as_secs_f64());
+        drop(built);
+    }
+    let measured = median(rates);
+    table.promises.push(Promise { what: "octree of 512^3 u8, average, MB/s".into(), measured, at_least: 200.0 });
+    Ok(())
+}

@@ -1,0 +1,180 @@
+//! The measuring itself: contestants take turns, so that what else the machine does hits them alike.
+
+use std::time::{Duration, Instant};
+
+use brickfield::frame::{Frame, Timing};
+use brickfield::options::progress_bar;
+use indicatif::ProgressBar;
+
+use super::CompareError;
+use super::output::{OutputError, Pictures, Shown};
+use super::rivals::Rivals;
+use super::sweep::{Case, Priority, REACHED};
+use crate::metrics::median;
+use crate::report::{LeftOut, Row};
+
+/// How much is measured.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// When the last frame must have been started, and be expected to end.
+    pub(super) end: Instant,
+    /// Most timed frames of each contestant.
+    pub(super) n_frames: u32,
+}
+
+pub(super) struct Contest<'a> {
+    pub(super) cases: &'a [Case],
+    pub(super) rivals: &'a mut Rivals,
+    pub(super) pictures: &'a Pictures<'a>,
+    pub(super) limits: Limits,
+}
+
+/// One backend at one case: its first frame has been drawn and judged.
+struct Entry {
+    case: usize,
+    rival: usize,
+    shown: Shown,
+    warm_up: Timing,
+    timed: Vec<Timing>,
+    /// How long a frame takes altogether, upload and read-back included.
+    whole: Duration,
+}
+
+impl Contest<'_> {
+    /// A first frame of everybody, which warms up and gives the picture; then timed rounds, until frames or time run out.
+    pub(super) fn run(mut self) -> Result<(Vec<Row>, Vec<LeftOut>), CompareError> {
+        let bar = progress_bar("measuring");
+        bar.set_length((self.cases.len() * self.rivals.present.len()) as u64 * u64::from(1 + self.limits.n_frames));
+        let (mut entries, mut left_out) = self.first_round(&bar)?;
+        for _ in 0..self.limits.n_frames {
+            self.round(&mut entries, &mut left_out, &bar);
+        }
+        bar.finish_and_clear();
+        Ok((entries.into_iter().map(|e| self.row(e)).collect(), left_out))
+    }
+
+    fn first_round(&mut self, bar: &ProgressBar) -> Result<(Vec<Entry>, Vec<LeftOut>), CompareError> {
+        let (mut entries, mut left_out): (Vec<Entry>, Vec<LeftOut>) = (Vec::new(), Vec::new());
+        // Half the time is for first frames, so that the other half is for timed ones; what leads may take more.
+        let begin = Instant::now();
+        let half = begin + self.limits.end.saturating_duration_since(begin) / 2;
+        for case in 0..self.cases.len() {
+            for rival in 0..self.rivals.present.len() {
+                bar.inc(1);
+                if self.is_reached(&entries, case, rival) {
+                    continue;
+                }
+                let end = if self.cases[case].priority == Priority::Normal { half } else { self.limits.end };
+                let expected = self.expected(&entries, case, rival);
+                if Instant::now() + expected > end && case > 0 {
+                    let reason = format!("it would take {:.1} s a frame: allow more --seconds", expected.as_secs_f64());
+                    left_out.push(self.left_out(case, rival, reason));
+                    continue;
+                }
+                match self.first_frame(case, rival)? {
+                    Ok(entry) => entries.push(entry),
+                    Err(reason) => left_out.push(self.left_out(case, rival, reason)),
+                }
+            }
+        }
+        Ok((entries, left_out))
+    }
+
+    /// Whether a smaller step is not needed any more: the pursued curve's error is below [`REACHED`].
+    fn is_reached(&self, entries: &[Entry], case: usize, rival: usize) -> bool {
+        let c = &self.cases[case];
+        let reached = |e: &Entry| e.shown.errors.rmse < REACHED && like(&self.cases[e.case], c) && e.rival == rival;
+        c.priority == Priority::Pursuit && entries.iter().any(reached)
+    }
+
+    /// How long a first frame should take, by the same backend's last one of that rule and mode.
+    fn expected(&self, entries: &[Entry], case: usize, rival: usize) -> Duration {
+        let c = &self.cases[case];
+        let last = entries.iter().rev().find(|e| e.rival == rival && like(&self.cases[e.case], c));
+        let Some(last) = last else { return Duration::ZERO };
+        let more = c.n_samples as f64 / self.cases[last.case].n_samples.max(1) as f64;
+        Duration::from_secs_f64((last.warm_up.wall_ms * more.max(0.0)).min(1e9) * 1e-3)
+    }
+
+    /// The inner error says why this frame could not be had; the outer one ends the comparison.
+    fn first_frame(&mut self, case: usize, rival: usize) -> Result<Result<Entry, String>, OutputError> {
+        let (begin, c) = (Instant::now(), &self.cases[case]);
+        let backend = &mut self.rivals.present[rival];
+        let Frame { image, timing } = match backend.render(&c.plan) {
+            Ok(frame) => frame,
+            Err(e) => return Ok(Err(e.to_string())),
+        };
+        let whole = begin.elapsed();
+        let shown = self.pictures.judge(c, backend.describe(), &image)?;
+        Ok(shown.map(|shown| Entry { case, rival, shown, warm_up: timing, timed: Vec::new(), whole }))
+    }
+
+    fn round(&mut self, entries: &mut Vec<Entry>, left_out: &mut Vec<LeftOut>, bar: &ProgressBar) {
+        let mut failed = Vec::new();
+        for (i, entry) in entries.iter_mut().enumerate() {
+            bar.inc(1);
+            if Instant::now() + entry.whole > self.limits.end {
+                continue;
+            }
+            let begin = Instant::now();
+            match self.rivals.present[entry.rival].render(&self.cases[entry.case].plan) {
+                Ok(frame) => entry.timed.push(frame.timing),
+                Err(e) => failed.push((i, e.to_string())),
+            }
+            entry.whole = begin.elapsed();
+        }
+        for (i, reason) in failed.into_iter().rev() {
+            let entry = entries.remove(i);
+            left_out.push(self.left_out(entry.case, entry.rival, format!("a later frame failed: {reason}")));
+        }
+    }
+
+    fn left_out(&self, case: usize, rival: usize, reason: String) -> LeftOut {
+        let c = &self.cases[case];
+        LeftOut {
+            backend: self.rivals.present[rival].describe().backend.to_owned(),
+            mode: c.mode.name().to_owned(),
+            rule: c.rule.name().to_owned(),
+            step_voxels: c.step_voxels,
+            reason,
+        }
+    }
+
+    fn row(&self, entry: Entry) -> Row {
+        let (c, d) = (&self.cases[entry.case], self.rivals.present[entry.rival].describe());
+        let timings = if entry.timed.is_empty() { vec![entry.warm_up] } else { entry.timed };
+        let wall: Vec<f64> = timings.iter().map(|t| t.wall_ms).collect();
+        let device: Option<Vec<f64>> = timings.iter().map(|t| t.device_ms).collect();
+        let Shown { errors, delta_e, files, difference } = entry.shown;
+        Row {
+            backend: d.backend.to_owned(),
+            adapter: d.adapter.clone(),
+            mode: c.mode.name().to_owned(),
+            rule: c.rule.name().to_owned(),
+            step_voxels: c.step_voxels,
+            samples: c.n_samples,
+            min_ms: wall.iter().copied().fold(f64::INFINITY, f64::min),
+            max_ms: wall.iter().copied().fold(0.0, f64::max),
+            n_frames: wall.len() as u32,
+            median_ms: median(wall),
+            device_ms: device.map(median),
+            upload_ms: entry.warm_up.upload_ms,
+            rmse: errors.rmse,
+            max_abs: errors.worst.difference,
+            worst_pixel: errors.worst.pixel.to_array(),
+            p999: errors.p999,
+            delta_e_mean: delta_e.mean,
+            delta_e_p95: delta_e.percentile_95,
+            on_front: false,
+            exr: files.exr,
+            png: files.png,
+            difference_exr: difference.exr,
+            difference_png: difference.png,
+        }
+    }
+}
+
+/// Whether two cases lie on one curve.
+fn like(a: &Case, b: &Case) -> bool {
+    a.rule == b.rule && a.mode == b.mode
+}

@@ -1,0 +1,74 @@
+//! The backends that are compared, and those that are absent.
+
+use brickfield::frame::{Backend, Description};
+use brickfield::{BackendKind, Validation, open_backend};
+
+use super::CompareError;
+use crate::report::BackendInfo;
+
+/// The backends that could be opened, and what is to be said of all that were asked for.
+pub(super) struct Rivals {
+    pub(super) present: Vec<Box<dyn Backend>>,
+    pub(super) infos: Vec<BackendInfo>,
+}
+
+impl Rivals {
+    /// Opens each kind once; one that cannot be opened is absent, which is no error.
+    pub(super) fn open(kinds: &[BackendKind], adapter: Option<&str>) -> Rivals {
+        let mut rivals = Rivals { present: Vec::new(), infos: Vec::new() };
+        let mut kinds = kinds.to_vec();
+        kinds.sort();
+        kinds.dedup();
+        for kind in kinds {
+            let adapter = adapter.filter(|_| kind != BackendKind::Cpu);
+            match open_backend(kind, adapter, Validation::Off) {
+                Ok(backend) => {
+                    rivals.infos.push(present(backend.describe()));
+                    rivals.present.push(backend);
+                }
+                Err(e) => rivals.infos.push(absent(kind, e.to_string())),
+            }
+        }
+        rivals
+    }
+
+    /// # Errors
+    /// The first kind of `required` that is absent or was not asked for.
+    pub(super) fn check_required(&self, required: &[BackendKind]) -> Result<(), CompareError> {
+        for kind in required {
+            let info = self.infos.iter().find(|i| i.backend == kind.name());
+            let reason = match info {
+                Some(BackendInfo { absent: None, .. }) => continue,
+                Some(BackendInfo { absent: Some(reason), .. }) => reason.clone(),
+                None => "it is not among --backends".to_owned(),
+            };
+            return Err(CompareError::Required { backend: kind.to_string(), reason });
+        }
+        Ok(())
+    }
+}
+
+fn present(d: &Description) -> BackendInfo {
+    let (adapter, driver) = (Some(d.adapter.clone()), Some(d.driver.clone()));
+    BackendInfo { backend: d.backend.to_owned(), adapter, driver, absent: None }
+}
+
+fn absent(kind: BackendKind, reason: String) -> BackendInfo {
+    let reason = reason.split_whitespace().collect::<Vec<_>>().join(" ");
+    BackendInfo { backend: kind.name().to_owned(), adapter: None, driver: None, absent: Some(reason) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_required_backend_that_is_absent_is_an_error() {
+        let rivals = Rivals { present: vec![], infos: vec![absent(BackendKind::Ash, "no\n driver".to_owned())] };
+        let error = |kind| rivals.check_required(&[kind]).unwrap_err().to_string();
+        assert_eq!(error(BackendKind::Ash), "ash is required and absent: no driver");
+        assert_eq!(error(BackendKind::Cpu), "cpu is required and absent: it is not among --backends");
+        let cpu = Rivals::open(&[BackendKind::Cpu, BackendKind::Cpu], None);
+        assert_eq!((cpu.present.len(), cpu.check_required(&[BackendKind::Cpu]).is_ok()), (1, true));
+    }
+}

@@ -1,0 +1,142 @@
+//! A case: something to render or evaluate, what holds it to account, and the mutants that it must catch.
+
+use std::collections::BTreeSet;
+use std::fmt;
+
+use brickfield::bricks::BrickTree;
+use brickfield::frame::{FramePlan, ShaderFunction};
+use brickfield::{PrepareError, Residency, Scene, Skipping, prepare};
+use brickfield_core::Volume;
+
+use super::plan_mutants::PlanMutant;
+use super::shader_mutants::ShaderMutant;
+
+/// A case of the conformance run.
+pub struct Case {
+    /// Its name: group/what.
+    pub name: String,
+    /// What is done.
+    pub check: Check,
+    /// The mutants that the case must catch; at least one.
+    pub mutants: Vec<Mutant>,
+}
+
+/// What a case does.
+pub enum Check {
+    /// Renders a scene.
+    Picture(Box<dyn Fn() -> Result<Subject, NoData>>),
+    /// Evaluates one function on a list of inputs.
+    Function(Box<dyn Fn() -> FunctionTest>),
+}
+
+/// A backend with one thing wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Mutant {
+    /// In the plan that it is handed.
+    Plan(PlanMutant),
+    /// In the shaders that it compiles.
+    Shader(ShaderMutant),
+}
+
+/// The data that a case needs is not on this machine.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no data: {reason}")]
+#[allow(missing_docs)]
+pub struct NoData {
+    pub reason: String,
+}
+
+/// What a picture case renders.
+pub struct Subject {
+    /// The volume's octree.
+    pub tree: BrickTree,
+    /// How it is shown.
+    pub scene: Scene,
+    /// Who else knows the picture.
+    pub oracle: Oracle,
+}
+
+/// A second answer, that shares no code with `prepare`.
+pub enum Oracle {
+    /// The volume's own samples at full resolution; the reference must agree to 1e-9.
+    Volume(Box<Volume>),
+    /// The picture at full resolution, though the cut is coarser: the field is one that every level reproduces.
+    EveryLevel(Box<Volume>),
+    /// None: coarse levels of a field that they change.
+    None,
+}
+
+/// One function, its inputs and its answers.
+pub struct FunctionTest {
+    /// The plan in whose context it is evaluated.
+    pub plan: FramePlan,
+    /// The function.
+    pub function: ShaderFunction,
+    /// Inputs, each with what must come out.
+    pub points: Vec<Point>,
+}
+
+/// An input, its answer, and how far each channel may be off.
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs)]
+pub struct Point {
+    pub input: [f32; 4],
+    pub expected: [f64; 4],
+    pub tolerance: [f64; 4],
+}
+
+/// A picture case's plans: what backends replay, and what they are held to.
+pub struct Plans {
+    /// What backends replay.
+    pub replayed: FramePlan,
+    /// The same frame without skipping: what the replayed one must look like.
+    pub complete: FramePlan,
+}
+
+impl Subject {
+    /// Prepares the scene as it is, and without skipping.
+    ///
+    /// # Errors
+    /// What `prepare` refuses.
+    pub fn plans(&self) -> Result<Plans, PrepareError> {
+        let complete = Scene { skipping: Skipping::Off, ..self.scene.clone() };
+        Ok(Plans {
+            replayed: prepare(&self.tree, &self.scene, &mut Residency::default())?,
+            complete: prepare(&self.tree, &complete, &mut Residency::default())?,
+        })
+    }
+}
+
+impl Mutant {
+    /// The mutant's name in reports.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Mutant::Plan(m) => m.name(),
+            Mutant::Shader(m) => m.name,
+        }
+    }
+
+    /// All mutants.
+    pub fn all() -> BTreeSet<Mutant> {
+        let shaders = super::shader_mutants::ALL.iter().copied().map(Mutant::Shader);
+        PlanMutant::ALL.into_iter().map(Mutant::Plan).chain(shaders).collect()
+    }
+}
+
+impl fmt::Display for Mutant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl From<PlanMutant> for Mutant {
+    fn from(m: PlanMutant) -> Mutant {
+        Mutant::Plan(m)
+    }
+}
+
+impl From<ShaderMutant> for Mutant {
+    fn from(m: ShaderMutant) -> Mutant {
+        Mutant::Shader(m)
+    }
+}

@@ -1,0 +1,171 @@
+//! What must stay finite, bounded and equal on all backends at the ends of every range.
+
+use brickfield_core::glam::{DMat3, DVec3, UVec2, UVec3};
+use brickfield_core::{Grid, ScalarType, TransferFunction, Volume};
+use brickfield_optics::QuadratureRule;
+
+use super::fields::{COOL, DIMS, WARM, ball, constant, grid, hills, knot, soft};
+use super::setup::{Setup, catches, picture};
+use crate::conformance::case::Case;
+use crate::conformance::plan_mutants::PlanMutant::*;
+use crate::conformance::shader_mutants as shader;
+use crate::volumes::spread;
+
+pub(super) fn cases() -> Vec<Case> {
+    [depths(), voxels(), shapes(), places()].into_iter().flatten().collect()
+}
+
+/// tau h from 1e-12 to 1e12, and what lies between on one ray.
+fn depths() -> Vec<Case> {
+    let thin = |tau: f64| move || Setup::new(constant(&grid(), ScalarType::U8, 0.4), transfer(tau));
+    let scaled = |top: f64, rule| {
+        move || {
+            let knots = [knot(0.2, 0.0, WARM), knot(0.9, top, COOL)];
+            let transfer = spread(&knots, ScalarType::F32).expect("knots ascend");
+            Setup::new(ball(&grid(), ScalarType::F32), transfer).rule(rule)
+        }
+    };
+    let mut cases = vec![
+        // alpha = 1 - e^-x without the series gives 0 for tau h = 1e-8, hence a picture of 0 instead of 2e-4.
+        picture("extreme/tau-1e-5", catches![shader::ALPHA_CANCELS], move || {
+            // 2,000 steps of tau h = 5e-8: their sum is visible, each of them is below the digits of 1 - e^-x.
+            thin(2.5e-6)().step(0.02).with(|s| s.size = UVec2::splat(24))
+        }),
+        picture("extreme/tau-1e12", catches![RowsFlipped], move || scaled(1e12, QuadratureRule::MidpointExponential)()),
+        picture("extreme/alpha-1", catches![DomainAtSamples, RedBlueSwapped], || {
+            let depth = brickfield_optics::depth(1.0);
+            Setup::new(constant(&grid(), ScalarType::U8, 0.4), transfer(2.0 * depth))
+        }),
+    ];
+    cases.push(picture("extreme/tau-1e-12-to-1e12", catches![KnotMoved, DecodeOffset, shader::ALPHA_LINEAR], || {
+        let knots = [(0.2, 1e-12), (0.35, 1e-6), (0.45, 1e-2), (0.6, 1.0), (0.75, 1e3), (0.9, 1e12)];
+        let knots = knots.map(|(value, extinction)| knot(value, extinction, [value, 1.0 - value, 0.5]));
+        Setup::new(hills(&grid(), ScalarType::F32), spread(&knots, ScalarType::F32).expect("knots ascend"))
+    }));
+    cases
+}
+
+fn transfer(tau: f64) -> TransferFunction {
+    TransferFunction::constant(tau, WARM).expect("a constant")
+}
+
+/// NaN, infinities and denormals among the voxels.
+fn voxels() -> Vec<Case> {
+    let spoiled = || {
+        let honest = hills(&grid(), ScalarType::F32);
+        let value = |i: usize| match i % 97 {
+            3 => f32::NAN,
+            31 => f32::INFINITY,
+            59 => f32::NEG_INFINITY,
+            61 => 1e-40,
+            _ => honest.voxels().at(i) as f32,
+        };
+        Volume::new(grid(), (0..honest.voxels().len()).map(value).collect::<Vec<f32>>()).expect("as many voxels")
+    };
+    let huge = || {
+        let honest = hills(&grid(), ScalarType::F64);
+        let values = (0..honest.voxels().len()).map(|i| 1e30 * (honest.voxels().at(i) - 0.5));
+        Volume::new(grid(), values.collect::<Vec<f64>>()).expect("as many voxels")
+    };
+    let tiny = || {
+        let honest = hills(&grid(), ScalarType::F32);
+        let values = (0..honest.voxels().len()).map(|i| (1e-42 * honest.voxels().at(i)) as f32);
+        Volume::new(grid(), values.collect::<Vec<f32>>()).expect("as many voxels")
+    };
+    let offset = || {
+        let honest = hills(&grid(), ScalarType::F64);
+        let values = (0..honest.voxels().len()).map(|i| 1e9 + honest.voxels().at(i));
+        Volume::new(grid(), values.collect::<Vec<f64>>()).expect("as many voxels")
+    };
+    let over = |low: f64, high: f64| {
+        let knots = [knot(low, 0.0, WARM), knot(0.5 * low + 0.5 * high, 0.1, WARM), knot(high, 0.2, COOL)];
+        TransferFunction::new(knots.into()).expect("knots ascend")
+    };
+    vec![
+        picture("extreme/nan-and-infinity", catches![BricksShifted, shader::NEAREST, KnotMoved], move || {
+            Setup::new(spoiled(), soft(ScalarType::F32))
+        }),
+        picture("extreme/offset-1e9", catches![DecodeOffset, KnotMoved], move || {
+            Setup::new(offset(), over(1e9 + 0.2, 1e9 + 0.9))
+        }),
+        picture("extreme/values-1e30", catches![RedBlueSwapped, ExtinctionScaled], move || {
+            Setup::new(huge(), over(-3e29, 4e29))
+        }),
+        picture("extreme/denormals", catches![RedBlueSwapped, ExtinctionScaled], move || {
+            Setup::new(tiny(), over(-1.0, 1.0))
+        }),
+    ]
+}
+
+/// 1 x 1 x N and its like.
+fn shapes() -> Vec<Case> {
+    let of = |dims: [u32; 3], spacing: [f64; 3]| {
+        move || {
+            let grid = Grid::axis_aligned(dims.into(), spacing.into()).expect("a grid");
+            Setup::new(hills(&grid, ScalarType::U16), soft(ScalarType::U16))
+        }
+    };
+    let cube = [1.0; 3];
+    vec![
+        picture("extreme/1x1x50", catches![ExtinctionScaled, IndexSwapped], move || {
+            of([1, 1, 50], [9.0, 9.0, 1.0])().step(0.7)
+        }),
+        picture(
+            "extreme/60x1x1",
+            catches![BricksShifted, ExtinctionScaled, IndexSwapped],
+            of([60, 1, 1], [1.0, 12.0, 12.0]),
+        ),
+        picture(
+            "extreme/1x47x30",
+            catches![BricksTransposed, AnchorHalfVoxel, shader::INDEX_STRIDE],
+            of([1, 47, 30], cube),
+        ),
+        picture("extreme/one-voxel", catches![ExtinctionScaled, DomainAtSamples, shader::LAST_NOT_CUT], move || {
+            of([1, 1, 1], [30.0; 3])().step(0.13)
+        }),
+        picture("extreme/2x2x2", catches![BricksShifted, shader::NEAREST, shader::NO_CLAMP], move || {
+            of([2, 2, 2], [20.0; 3])().step(0.02)
+        }),
+        picture("extreme/brick-and-one", catches![BricksShifted, LastSampleCut], of([17, 16, 31], cube)),
+        picture("extreme/spacing-1-to-1000", catches![AnchorHalfVoxel, ExtinctionScaled], || {
+            // 1,000 samples through a voxel that is long, one through a thousand that are short.
+            let grid = Grid::axis_aligned(UVec3::new(33, 33, 3), DVec3::new(1.0, 1.0, 1000.0)).expect("a grid");
+            let knots = [knot(0.0, 0.0, WARM), knot(1.0, 0.002, COOL)];
+            let transfer = spread(&knots, ScalarType::U16).expect("knots ascend");
+            // From near its middle: seen whole it is thinner than a pixel.
+            let (eye, target) = (DVec3::new(90.0, -60.0, 1350.0), DVec3::new(16.5, 16.5, 1500.0));
+            Setup::new(hills(&grid, ScalarType::U16), transfer).step(2.0).eye(eye, target)
+        }),
+    ]
+}
+
+/// Far from the world's origin, far from the volume, and in the middle of a voxel.
+fn places() -> Vec<Case> {
+    let far_grid = || {
+        let first = DVec3::new(1e7, -1e7, 1e7);
+        Grid::from_first_sample(DIMS, DVec3::new(1.0, 0.8, 1.3), first, DMat3::IDENTITY).expect("a grid")
+    };
+    vec![
+        picture(
+            "extreme/origin-1e7",
+            catches![AnchorHalfVoxel, StepScaled, PixelCorner, shader::FLAT_SHELLS],
+            move || Setup::new(hills(&far_grid(), ScalarType::U16), soft(ScalarType::U16)),
+        ),
+        picture("extreme/eye-1e5-away", catches![AnchorHalfVoxel, PixelCorner], || {
+            let setup = Setup::new(hills(&grid(), ScalarType::U16), soft(ScalarType::U16));
+            setup.with(|s| {
+                let target = DVec3::new(20.0, 18.0, 16.5);
+                let eye = target + DVec3::new(0.6, -1.0, 0.35) * 1e5;
+                let fov_y = 5e-4;
+                let projection = brickfield_core::Projection::Perspective { fov_y };
+                let camera = brickfield_core::Camera::look_at(eye, target, DVec3::Z, projection);
+                s.camera = camera.expect("a camera");
+            })
+        }),
+        picture("extreme/eye-in-a-voxel", catches![AnchorHalfVoxel, BricksShifted], || {
+            let setup = Setup::new(hills(&grid(), ScalarType::U16), soft(ScalarType::U16)).step(0.05);
+            let eye = DVec3::new(20.31, 17.77, 16.12);
+            setup.eye(eye, eye + DVec3::new(0.2, 0.3, -0.1)).with(|s| s.size = UVec2::splat(32))
+        }),
+    ]
+}

@@ -1,0 +1,52 @@
+//! Fast mode: hardware filtering and rays that end early, within the bound of the device's filter.
+
+use brickfield::bricks::Downsampling;
+use brickfield::frame::Mode;
+use brickfield::lod::Criterion;
+use brickfield_core::ScalarType;
+use brickfield_core::glam::DVec3;
+use brickfield_optics::QuadratureRule;
+
+use super::fields::{COOL, WARM, grid, hills, knot, shell, soft, sparse};
+use super::setup::{Setup, catches, picture};
+use crate::conformance::case::Case;
+use crate::conformance::plan_mutants::PlanMutant::*;
+use crate::conformance::shader_mutants as shader;
+use crate::volumes::spread;
+
+pub(super) fn cases() -> Vec<Case> {
+    let fast = |setup: Setup| setup.with(|s| s.mode = Mode::FAST);
+    let opaque = [knot(0.3, 0.0, WARM), knot(0.7, 0.6, COOL)];
+    let hills_of = move |scalar| Setup::new(hills(&grid(), scalar), soft(scalar));
+    let broad = catches![IndexSwapped, RedBlueSwapped, shader::HALF_TEXEL];
+    vec![
+        picture("fast/u8", broad.clone(), move || fast(hills_of(ScalarType::U8))),
+        picture("fast/u16", broad.clone(), move || fast(hills_of(ScalarType::U16))),
+        picture("fast/f32", broad, move || fast(hills_of(ScalarType::F32))),
+        picture("fast/shell-u8", catches![RowsFlipped, ExtinctionScaled, shader::HALF_TEXEL], move || {
+            fast(Setup::new(shell(&grid(), ScalarType::U8), soft(ScalarType::U8)))
+        }),
+        picture("fast/opaque", catches![EndsEarly, RowsFlipped, shader::ENDS_EARLY], move || {
+            fast(Setup::new(hills(&grid(), ScalarType::F32), spread(&opaque, ScalarType::F32).expect("knots ascend")))
+        }),
+        picture("fast/no-floor", catches![EndsEarly, RowsFlipped], move || {
+            let setup =
+                Setup::new(hills(&grid(), ScalarType::F32), spread(&opaque, ScalarType::F32).expect("knots ascend"));
+            setup.with(|s| s.mode = Mode::Fast { transmittance_floor: 0.0 })
+        }),
+        picture("fast/several-levels", catches![WrongLevel, RowsFlipped, shader::LEVEL_SCALE], move || {
+            let near = DVec3::new(-4.0, -9.0, 20.0);
+            fast(hills_of(ScalarType::U16).detail(Criterion::Distance { factor: 1.0 }, Downsampling::Average))
+                .eye(near, DVec3::new(20.0, 18.0, 16.0))
+        }),
+        picture("fast/sparse", catches![VisibleTooSmall, shader::JUMPS_TOO_FAR], move || {
+            fast(Setup::new(sparse(&grid(), ScalarType::U16), soft(ScalarType::U16)))
+        }),
+        picture("fast/gauss2", catches![IndexSwapped, RowsFlipped, shader::HALF_TEXEL], move || {
+            fast(hills_of(ScalarType::U16).rule(QuadratureRule::Gauss2))
+        }),
+        picture("fast/preintegrated", catches![IndexSwapped, RowsFlipped, shader::HALF_TEXEL], move || {
+            fast(hills_of(ScalarType::U16).rule(QuadratureRule::PreIntegrated))
+        }),
+    ]
+}

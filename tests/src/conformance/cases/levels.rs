@@ -1,0 +1,122 @@
+//! Brick sides, coarser levels, cuts of several levels, and what is left out.
+
+use brickfield::bricks::Downsampling;
+use brickfield::lod::Criterion;
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{BrickSide, Grid, Level, ScalarType, TransferFunction, Volume};
+use brickfield_optics::QuadratureRule;
+
+use super::fields::{COOL, WARM, grid, hills, knot, ramp, soft, sparse};
+use super::setup::{Setup, catches, picture};
+use crate::conformance::case::Case;
+use crate::conformance::plan_mutants::PlanMutant::*;
+use crate::conformance::shader_mutants as shader;
+use crate::volumes::spread;
+
+pub(super) fn cases() -> Vec<Case> {
+    [sides(), coarse(), mixed(), skipping()].into_iter().flatten().collect()
+}
+
+/// 5 x 5 x 4 bricks of 16, a divisor of nothing.
+fn large() -> Volume {
+    hills(&Grid::axis_aligned(UVec3::new(71, 66, 53), DVec3::ONE).expect("a grid"), ScalarType::U16)
+}
+
+/// All levels end at the last sample: 4 x 4 x 2 bricks of 16.
+fn even_ramp() -> Volume {
+    ramp(&Grid::axis_aligned(UVec3::new(61, 61, 31), DVec3::ONE).expect("a grid"))
+}
+
+fn transfer() -> TransferFunction {
+    soft(ScalarType::U16)
+}
+
+fn sides() -> Vec<Case> {
+    let one = |side: BrickSide| {
+        picture(format!("brick/{side}"), catches![BricksShifted, BricksTransposed, shader::OVERSTAYS], move || {
+            Setup::new(large(), transfer()).side(side)
+        })
+    };
+    let whole = picture("brick/one-brick", catches![BricksTransposed, BricksShifted, shader::NEAREST], || {
+        Setup::new(hills(&grid(), ScalarType::U16), transfer()).side(BrickSide::S64)
+    });
+    let mut cases: Vec<Case> = BrickSide::ALL.map(one).into();
+    // One brick holds the whole volume of 64: nothing to overstay in.
+    cases[2].mutants = catches![BricksShifted, BricksTransposed, IndexSwapped];
+    cases.push(whole);
+    cases
+}
+
+fn coarse() -> Vec<Case> {
+    let uniform = |level| Criterion::Uniform(Level(level));
+    let of = |name, level, downsampling| {
+        let mutants = catches![WrongLevel, BricksShifted, shader::LEVEL_SCALE, shader::BLOCK_CORNER];
+        picture(name, mutants, move || Setup::new(large(), transfer()).detail(uniform(level), downsampling))
+    };
+    vec![
+        of("level/1-average", 1, Downsampling::Average),
+        of("level/1-subsample", 1, Downsampling::Subsample),
+        of("level/2-average", 2, Downsampling::Average),
+        picture("level/ramp-at-level-1", catches![WrongLevel, AnchorHalfVoxel, shader::LEVEL_SCALE], move || {
+            Setup::new(even_ramp(), soft(ScalarType::F32)).detail_reproduced(uniform(1))
+        }),
+        picture("level/root", catches![WrongLevel, BricksTransposed, shader::LEVEL_SCALE], move || {
+            Setup::new(large(), transfer()).detail(uniform(31), Downsampling::Average)
+        }),
+    ]
+}
+
+/// Cuts of several levels: faces where the field jumps.
+fn mixed() -> Vec<Case> {
+    let near = DVec3::new(-6.0, -14.0, 30.0);
+    let distance = |factor| Criterion::Distance { factor };
+    let of = |name, factor, rule| {
+        let mutants = catches![WrongLevel, BricksShifted, shader::LEVEL_SCALE, shader::BLOCK_CORNER];
+        picture(name, mutants, move || {
+            Setup::new(large(), transfer())
+                .detail(distance(factor), Downsampling::Average)
+                .eye(near, DVec3::new(35.0, 33.0, 26.0))
+                .rule(rule)
+        })
+    };
+    vec![
+        of("cut/several-levels", 1.0, QuadratureRule::MidpointExponential),
+        of("cut/several-levels-preintegrated", 1.0, QuadratureRule::PreIntegrated),
+        of("cut/several-levels-gauss2", 1.3, QuadratureRule::Gauss2),
+        picture("cut/ramp-on-several-levels", catches![WrongLevel, AnchorHalfVoxel, shader::BLOCK_CORNER], move || {
+            Setup::new(even_ramp(), soft(ScalarType::F32))
+                .detail_reproduced(distance(1.0))
+                .eye(DVec3::new(-6.0, -14.0, 20.0), DVec3::new(30.0, 30.0, 15.0))
+        }),
+        picture("cut/several-levels-sparse", catches![VisibleTooSmall, WrongLevel, shader::LEVEL_SCALE], move || {
+            let grid = Grid::axis_aligned(UVec3::new(71, 66, 53), DVec3::ONE).expect("a grid");
+            Setup::new(sparse(&grid, ScalarType::U8), soft(ScalarType::U8))
+                .detail(distance(1.0), Downsampling::Average)
+                .eye(near, DVec3::new(35.0, 33.0, 26.0))
+        }),
+    ]
+}
+
+/// Skipping changes no sample: the reference has every brick.
+fn skipping() -> Vec<Case> {
+    let scene = || {
+        let grid = Grid::axis_aligned(UVec3::new(71, 66, 53), DVec3::ONE).expect("a grid");
+        Setup::new(sparse(&grid, ScalarType::U8), soft(ScalarType::U8))
+    };
+    let rule = |rule: QuadratureRule| {
+        let mutants = catches![VisibleTooSmall, shader::JUMPS_TOO_FAR, ExtinctionScaled];
+        picture(format!("skip/{}", rule.name()), mutants, move || scene().rule(rule).step(0.9))
+    };
+    let mut cases: Vec<Case> = QuadratureRule::ALL.map(rule).into();
+    cases.push(picture("skip/long-steps-preintegrated", catches![VisibleTooSmall, ExtinctionScaled], move || {
+        scene().rule(QuadratureRule::PreIntegrated).step(11.0)
+    }));
+    cases.push(picture("skip/parallel", catches![VisibleTooSmall, shader::JUMPS_TOO_FAR], move || {
+        scene().parallel(DVec3::X, 60.0)
+    }));
+    cases.push(picture("skip/central-brick", catches![BrickTransparent, VisibleTooSmall], || {
+        let knots = [knot(0.55, 0.0, WARM), knot(0.8, 0.3, COOL)];
+        Setup::new(large(), spread(&knots, ScalarType::U16).expect("knots ascend"))
+    }));
+    cases
+}

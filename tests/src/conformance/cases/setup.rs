@@ -1,0 +1,142 @@
+//! How a case states its scene: volume and transfer function, then what differs from the defaults.
+
+use brickfield::Scene;
+use brickfield::bricks::{BuildOptions, Downsampling, build_tree};
+use brickfield::lod::Criterion;
+use brickfield_core::glam::{DVec3, UVec2};
+use brickfield_core::{Aabb, BrickSide, Camera, Projection, ScalarType, TransferFunction, Volume};
+use brickfield_optics::QuadratureRule;
+
+use super::super::case::{Case, Check, Mutant, NoData, Oracle, Subject};
+
+/// A scene in the making.
+pub(super) struct Setup {
+    volume: Volume,
+    side: BrickSide,
+    downsampling: Downsampling,
+    oracle: OracleKind,
+    scene: Scene,
+}
+
+#[derive(Clone, Copy)]
+enum OracleKind {
+    Volume,
+    EveryLevel,
+    None,
+}
+
+/// Side of most pictures.
+pub(super) const PICTURE: UVec2 = UVec2::new(64, 56);
+/// From where most cameras look: no axis, no symmetry.
+pub(super) const OBLIQUE: DVec3 = DVec3::new(0.6, -1.0, 0.35);
+
+impl Setup {
+    /// A volume seen obliquely and whole, in bricks of 16, with the scene's defaults.
+    pub(super) fn new(volume: Volume, transfer: TransferFunction) -> Setup {
+        let camera = Camera::framing(&volume.grid().world_box(), OBLIQUE, DVec3::Z).expect("a volume has a box");
+        Setup {
+            side: BrickSide::S16,
+            downsampling: Downsampling::Average,
+            oracle: OracleKind::Volume,
+            scene: Scene::new(camera, PICTURE, transfer),
+            volume,
+        }
+    }
+
+    /// With the scene changed.
+    pub(super) fn with(mut self, change: impl FnOnce(&mut Scene)) -> Setup {
+        change(&mut self.scene);
+        self
+    }
+
+    pub(super) fn rule(self, rule: QuadratureRule) -> Setup {
+        self.with(|s| s.rule = rule)
+    }
+
+    pub(super) fn step(self, voxels: f64) -> Setup {
+        self.with(|s| s.step_voxels = voxels)
+    }
+
+    pub(super) fn side(mut self, side: BrickSide) -> Setup {
+        self.side = side;
+        self
+    }
+
+    /// Draws from coarser levels, of which the volume's own samples know nothing.
+    pub(super) fn detail(mut self, detail: Criterion, downsampling: Downsampling) -> Setup {
+        self.oracle = OracleKind::None;
+        self.downsampling = downsampling;
+        self.with(|s| s.detail = detail)
+    }
+
+    /// Draws from coarser levels a field that they reproduce.
+    pub(super) fn detail_reproduced(self, detail: Criterion) -> Setup {
+        Setup { oracle: OracleKind::EveryLevel, ..self.detail(detail, Downsampling::Subsample) }
+    }
+
+    pub(super) fn clip(self, min: [f64; 3], max: [f64; 3]) -> Setup {
+        self.with(|s| s.clip = Some(Aabb { min: min.into(), max: max.into() }))
+    }
+
+    /// Looks from a world position to another, through a wide lens.
+    pub(super) fn eye(self, eye: DVec3, target: DVec3) -> Setup {
+        self.lens(eye, target, 1.2)
+    }
+
+    /// Looks from a world position to another; `fov_y` in radians.
+    pub(super) fn lens(self, eye: DVec3, target: DVec3, fov_y: f64) -> Setup {
+        let projection = Projection::Perspective { fov_y };
+        let up = if (target - eye).normalize_or_zero().z.abs() > 0.9 { DVec3::Y } else { DVec3::Z };
+        let camera = Camera::look_at(eye, target, up, projection).expect("a case's camera is one");
+        self.with(|s| s.camera = camera)
+    }
+
+    /// Parallel rays in `direction` through the volume's centre; the picture is `height` world units high.
+    pub(super) fn parallel(self, direction: DVec3, height: f64) -> Setup {
+        let center = self.volume.grid().world_box().center();
+        let distance = self.volume.grid().world_box().diagonal();
+        let up = if direction.normalize_or_zero().z.abs() > 0.9 { DVec3::Y } else { DVec3::Z };
+        let projection = Projection::Orthographic { height };
+        let camera = Camera::look_at(center - direction.normalize_or_zero() * distance, center, up, projection);
+        self.with(|s| s.camera = camera.expect("a case's camera is one"))
+    }
+
+    /// The subject: builds the octree.
+    pub(super) fn build(self) -> Subject {
+        let options = BuildOptions { side: self.side, downsampling: self.downsampling, max_bytes: None };
+        let tree = build_tree(&self.volume, &options).expect("a case's octree fits");
+        let volume = Box::new(self.volume);
+        let oracle = match self.oracle {
+            OracleKind::Volume => Oracle::Volume(volume),
+            OracleKind::EveryLevel => Oracle::EveryLevel(volume),
+            OracleKind::None => Oracle::None,
+        };
+        Subject { tree, scene: self.scene, oracle }
+    }
+}
+
+/// A picture case.
+pub(super) fn picture(name: impl Into<String>, mutants: Vec<Mutant>, setup: impl Fn() -> Setup + 'static) -> Case {
+    fallible_picture(name, mutants, move || Ok(setup()))
+}
+
+/// A picture case whose data may be missing.
+pub(super) fn fallible_picture(
+    name: impl Into<String>,
+    mutants: Vec<Mutant>,
+    setup: impl Fn() -> Result<Setup, NoData> + 'static,
+) -> Case {
+    let check = Check::Picture(Box::new(move || Ok(setup()?.build())));
+    Case { name: name.into(), check, mutants }
+}
+
+/// A list of mutants of both kinds.
+macro_rules! catches {
+    ($($m:expr),* $(,)?) => { vec![$(crate::conformance::case::Mutant::from($m)),*] };
+}
+pub(super) use catches;
+
+/// The name of a scalar type as a case's part.
+pub(super) fn type_name(scalar: ScalarType) -> &'static str {
+    scalar.name()
+}

@@ -1,0 +1,226 @@
+//! Runs one case: makes what is asked, and judges what comes back.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use brickfield::cpu::{Discrete, discrete};
+use brickfield::frame::{Capabilities, RenderError};
+use brickfield_core::Image;
+
+use super::case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, Plans, Subject};
+use super::contestant::Contestant;
+use super::naive::naive;
+use super::rule::{Complaint, Tolerance, Verdict, bounded};
+
+/// A case that is ready to be run on any backend.
+pub struct Prepared {
+    work: Work,
+}
+
+enum Work {
+    Picture { subject: Box<Subject>, plans: Box<Plans>, reference: Discrete },
+    Function(Box<FunctionTest>),
+}
+
+/// Why a case could not be prepared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)]
+pub enum Obstacle {
+    #[error(transparent)]
+    NoData(#[from] NoData),
+    #[error("the scene is refused: {0}")]
+    Refused(#[from] brickfield::PrepareError),
+    #[error(transparent)]
+    Wrong(#[from] Complaint),
+}
+
+/// What came of a case on a backend.
+pub enum Judged {
+    /// The backend is absent.
+    Absent,
+    /// The backend cannot do this, and says so.
+    Unsupported(RenderError),
+    /// The backend failed.
+    Broken(RenderError),
+    /// The backend panicked.
+    Panicked(String),
+    /// A picture, and what the rules say.
+    Picture(Image<f32>, Verdict),
+    /// What a function returned was held against its equation: greatest difference in units of its tolerance.
+    Function(Result<f64, String>),
+}
+
+/// How far the reference may be from the volume's own sum: f64, in another order.
+const ORACLE: f64 = 1e-8;
+
+impl Prepared {
+    /// Makes plans, reference and inputs of a case, and holds the reference against the volume's own sum.
+    ///
+    /// # Errors
+    /// No data, a scene that is refused, a reference that is wrong.
+    pub fn of(case: &Case) -> Result<Prepared, Obstacle> {
+        let work = match &case.check {
+            Check::Function(test) => Work::Function(Box::new(test())),
+            Check::Picture(subject) => {
+                let subject = Box::new(subject()?);
+                let plans = Box::new(subject.plans()?);
+                let reference = discrete(&plans.complete);
+                check_oracle(&subject, &reference)?;
+                Work::Picture { subject, plans, reference }
+            }
+        };
+        Ok(Prepared { work })
+    }
+
+    /// The reference picture, if the case has one.
+    pub fn reference(&self) -> Option<&Image<f64>> {
+        match &self.work {
+            Work::Picture { reference, .. } => Some(&reference.image),
+            Work::Function(_) => None,
+        }
+    }
+
+    /// Runs the case on a backend; with a mutant, on the plan that the mutant makes of it. (Shader mutants are in the
+    /// backend.)
+    pub fn run(&self, on: &mut Contestant, mutant: Option<&Mutant>) -> Judged {
+        let Some(capabilities) = on.capabilities() else { return Judged::Absent };
+        let run = AssertUnwindSafe(|| match &self.work {
+            Work::Function(test) => run_function(test, on, mutant),
+            Work::Picture { plans, reference, .. } => run_picture(plans, reference, &capabilities, on, mutant),
+        });
+        // A backend that panics fails its case, not the run.
+        catch_unwind(run).unwrap_or_else(|payload| Judged::Panicked(words(payload.as_ref())))
+    }
+
+    /// The scene in a few words.
+    pub fn describe(&self) -> String {
+        match &self.work {
+            Work::Picture { subject, plans, .. } => {
+                let (scene, plan) = (&subject.scene, &plans.replayed);
+                let (n, size) = (plan.bricks.n_bricks(), scene.size);
+                format!("{} x {} pixels, {n} bricks, {}, {}", size.x, size.y, scene.rule.name(), scene.mode.name())
+            }
+            Work::Function(test) => format!("{} inputs", test.points.len()),
+        }
+    }
+}
+
+/// What a panic said.
+fn words(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().map(|s| (*s).to_owned());
+    text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default()
+}
+
+fn check_oracle(subject: &Subject, reference: &Discrete) -> Result<(), Complaint> {
+    let volume = match &subject.oracle {
+        Oracle::Volume(volume) => volume,
+        Oracle::EveryLevel(volume) => volume,
+        Oracle::None => return Ok(()),
+    };
+    // f32 samples carry a field that is linear only to f32.
+    let bound = if matches!(subject.oracle, Oracle::EveryLevel(_)) { 3e-6 } else { stored_rounding(subject) };
+    let own = naive(volume, &subject.scene);
+    let of_pixel = |(a, b): (&[f64; 4], &[f64; 4])| (0..4).map(|c| (a[c] - b[c]).abs()).fold(0.0, f64::max);
+    let differences = own.pixels().iter().zip(reference.image.pixels()).map(of_pixel);
+    let beyond = differences.zip(&reference.ambiguity).enumerate().find(|(_, (d, a))| is_beyond(*d, bound + **a));
+    match beyond {
+        Some((i, (difference, _))) => Err(Complaint::Oracle { pixel: super::rule::pixel(own.size(), i), difference }),
+        None => Ok(()),
+    }
+}
+
+/// f64, u32 and i32 are handed to backends as f32.
+fn stored_rounding(subject: &Subject) -> f64 {
+    use brickfield_core::ScalarType::{F32, F64, I32, U32};
+    match subject.tree.scalar_type() {
+        F64 | U32 | I32 | F32 => 5e-6,
+        _ => ORACLE,
+    }
+}
+
+fn run_picture(
+    plans: &Plans,
+    reference: &Discrete,
+    capabilities: &Capabilities,
+    on: &mut Contestant,
+    mutant: Option<&Mutant>,
+) -> Judged {
+    let tolerance = Tolerance::of(&plans.replayed, reference, capabilities);
+    let tolerance = match tolerance {
+        Ok(tolerance) => tolerance,
+        Err(complaint) => return refused(complaint),
+    };
+    let rendered = match mutant {
+        Some(Mutant::Plan(mutant)) => on.render(&mutant.apply(&plans.replayed)),
+        _ => on.render(&plans.replayed),
+    };
+    let image = match rendered {
+        None => return Judged::Absent,
+        Some(Err(e)) => return failed(e),
+        Some(Ok(image)) => image,
+    };
+    let mut verdict = tolerance.judge(&image, &reference.image);
+    let empty = || tolerance.is_empty_promise().map(|bound| Complaint::EmptyPromise { bound });
+    // Rules of thumb that hold whatever the reference says; a mutant is caught by them, too.
+    verdict.complaint = verdict
+        .complaint
+        .or_else(|| bounded(&image, &plans.complete.transfer))
+        .or_else(|| empty().filter(|_| mutant.is_none()));
+    Judged::Picture(image, verdict)
+}
+
+fn refused(complaint: Complaint) -> Judged {
+    let verdict = Verdict { errors: None, closest: None, complaint: Some(complaint) };
+    Judged::Picture(Image::transparent(brickfield_core::glam::UVec2::ZERO), verdict)
+}
+
+fn run_function(test: &FunctionTest, on: &mut Contestant, mutant: Option<&Mutant>) -> Judged {
+    let inputs: Vec<[f32; 4]> = test.points.iter().map(|p| p.input).collect();
+    let evaluated = match mutant {
+        Some(Mutant::Plan(mutant)) => on.evaluate(&mutant.apply(&test.plan), test.function, &inputs),
+        _ => on.evaluate(&test.plan, test.function, &inputs),
+    };
+    match evaluated {
+        None => Judged::Absent,
+        Some(Err(e)) => failed(e),
+        Some(Ok(outputs)) => Judged::Function(hold(test, &outputs)),
+    }
+}
+
+/// Whether a difference is above its bound; NaN is.
+fn is_beyond(difference: f64, bound: f64) -> bool {
+    difference.is_nan() || difference > bound
+}
+
+/// The greatest difference in units of its tolerance; or the first point that is off, in words.
+fn hold(test: &FunctionTest, outputs: &[[f32; 4]]) -> Result<f64, String> {
+    if outputs.len() != test.points.len() || outputs.is_empty() {
+        return Err(format!("{} outputs for {} inputs", outputs.len(), test.points.len()));
+    }
+    let mut worst = 0.0f64;
+    for (point, output) in test.points.iter().zip(outputs) {
+        for (c, got) in output.iter().enumerate() {
+            let (got, expected, tolerance) = (f64::from(*got), point.expected[c], point.tolerance[c]);
+            let difference = (got - expected).abs();
+            if is_beyond(difference, tolerance) {
+                let name = test.function.name();
+                return Err(format!(
+                    "{name}{:?} channel {c}: {got:e}, expected {expected:e}, off by {difference:.2e}, {tolerance:.2e} allowed",
+                    point.input
+                ));
+            }
+            worst = worst.max(if tolerance > 0.0 { difference / tolerance } else { 0.0 });
+        }
+    }
+    Ok(worst)
+}
+
+fn failed(e: RenderError) -> Judged {
+    match e {
+        RenderError::Unsupported { .. }
+        | RenderError::ImageTooLarge { .. }
+        | RenderError::AtlasTooLarge { .. }
+        | RenderError::BufferTooLarge { .. } => Judged::Unsupported(e),
+        _ => Judged::Broken(e),
+    }
+}

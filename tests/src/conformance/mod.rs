@@ -1,0 +1,34 @@
+//! Cases x backends: every case renders (or evaluates) on every backend and is held to the f64 answer by a rule.
+//!
+//! - [`Case`]: a scene or a function, and the mutants that it must catch; [`cases`] lists them.
+//! - [`Tolerance`]: the rules. No case has a tolerance of its own.
+//! - `naive`: a second opinion on the reference itself, straight from the volume's voxels.
+//! - [`PlanMutant`], [`ShaderMutant`]: backends with one thing wrong; [`SelfCheck`] runs them.
+//! - [`Run`], [`Outcome`], [`Summary`]: pass, fail, unsupported, no-device, no-data. Absence is reported, never passed.
+
+mod case;
+mod cases;
+mod check;
+mod contestant;
+mod filter;
+mod naive;
+mod outcome;
+mod pictures;
+mod plan_mutants;
+mod rule;
+mod run;
+mod samples;
+mod self_check;
+pub mod shader_mutants;
+
+pub use case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, Plans, Point, Subject};
+pub use cases::all as cases;
+pub use check::{Judged, Obstacle, Prepared};
+pub use contestant::Contestant;
+pub use outcome::{Outcome, Status, Summary};
+pub use pictures::write_difference;
+pub use plan_mutants::PlanMutant;
+pub use rule::{Complaint, Tolerance, Verdict};
+pub use run::Run;
+pub use self_check::SelfCheck;
+pub use shader_mutants::ShaderMutant;

@@ -1,0 +1,312 @@
+//! Plans with one thing wrong, to see that the cases notice. Backends replay them like any other.
+
+use std::sync::Arc;
+
+use brickfield::frame::{BrickSet, Decode, Feature, FramePlan, IndexEntry, Mode, Sampling};
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{Aabb, Knot, Level, TransferFunction};
+use brickfield_optics::QuadratureRule;
+
+/// One thing wrong with a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum PlanMutant {
+    /// Rays start half a voxel off along x.
+    AnchorHalfVoxel,
+    /// Rays pass the pixels' corners, not their centres.
+    PixelCorner,
+    /// The picture is upside down.
+    RowsFlipped,
+    /// The step is 5 % too large.
+    StepScaled,
+    /// Segments begin half a step late.
+    PhaseHalfStep,
+    /// Directions are not normalised.
+    NotNormalised,
+    /// The rays are parallel.
+    Parallel,
+    /// The segment's value is taken at its near end.
+    LeftRule,
+    /// The domain ends at the outer sample centres.
+    DomainAtSamples,
+    /// The last segment of every ray is dropped.
+    LastSegmentDropped,
+    /// The visible box misses a slice of the volume's visible part.
+    VisibleTooSmall,
+    /// A brick in the middle is marked transparent.
+    BrickTransparent,
+    /// Two bricks are swapped in the index.
+    IndexSwapped,
+    /// A brick is taken for one of the next coarser level (or a coarser one for the finest).
+    WrongLevel,
+    /// The samples of every brick are shifted by one along x.
+    BricksShifted,
+    /// The last layer of every brick repeats the one before: the border is not shared.
+    BorderNotShared,
+    /// x and y are swapped inside every brick.
+    BricksTransposed,
+    /// The bytes of samples are swapped.
+    BytesSwapped,
+    /// The top bit of integers is turned.
+    SignTurned,
+    /// Values are read 1 % of the transfer function's range too high.
+    DecodeOffset,
+    /// Values are scaled by 256/255.
+    DecodeScale,
+    /// The volume ends a sample early.
+    LastSampleCut,
+    /// The inner knots of the transfer function are moved, the lowest by 5 % of its range.
+    KnotMoved,
+    /// Extinction is 2 % too high.
+    ExtinctionScaled,
+    /// Red and blue are swapped.
+    RedBlueSwapped,
+    /// Rays end at a transmittance of 1/4.
+    EndsEarly,
+}
+
+impl PlanMutant {
+    /// All plan mutants.
+    pub const ALL: [PlanMutant; 26] = [
+        PlanMutant::AnchorHalfVoxel,
+        PlanMutant::PixelCorner,
+        PlanMutant::RowsFlipped,
+        PlanMutant::StepScaled,
+        PlanMutant::PhaseHalfStep,
+        PlanMutant::NotNormalised,
+        PlanMutant::Parallel,
+        PlanMutant::LeftRule,
+        PlanMutant::DomainAtSamples,
+        PlanMutant::LastSegmentDropped,
+        PlanMutant::VisibleTooSmall,
+        PlanMutant::BrickTransparent,
+        PlanMutant::IndexSwapped,
+        PlanMutant::WrongLevel,
+        PlanMutant::BricksShifted,
+        PlanMutant::BorderNotShared,
+        PlanMutant::BricksTransposed,
+        PlanMutant::BytesSwapped,
+        PlanMutant::SignTurned,
+        PlanMutant::DecodeOffset,
+        PlanMutant::DecodeScale,
+        PlanMutant::LastSampleCut,
+        PlanMutant::KnotMoved,
+        PlanMutant::ExtinctionScaled,
+        PlanMutant::RedBlueSwapped,
+        PlanMutant::EndsEarly,
+    ];
+
+    /// The mutant's name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            PlanMutant::AnchorHalfVoxel => "plan/anchor-half-voxel",
+            PlanMutant::PixelCorner => "plan/pixel-corner",
+            PlanMutant::RowsFlipped => "plan/rows-flipped",
+            PlanMutant::StepScaled => "plan/step-scaled",
+            PlanMutant::PhaseHalfStep => "plan/phase-half-step",
+            PlanMutant::NotNormalised => "plan/not-normalised",
+            PlanMutant::Parallel => "plan/parallel",
+            PlanMutant::LeftRule => "plan/left-rule",
+            PlanMutant::DomainAtSamples => "plan/domain-at-samples",
+            PlanMutant::LastSegmentDropped => "plan/last-segment-dropped",
+            PlanMutant::VisibleTooSmall => "plan/visible-too-small",
+            PlanMutant::BrickTransparent => "plan/brick-transparent",
+            PlanMutant::IndexSwapped => "plan/index-swapped",
+            PlanMutant::WrongLevel => "plan/wrong-level",
+            PlanMutant::BricksShifted => "plan/bricks-shifted",
+            PlanMutant::BorderNotShared => "plan/border-not-shared",
+            PlanMutant::BricksTransposed => "plan/bricks-transposed",
+            PlanMutant::BytesSwapped => "plan/bytes-swapped",
+            PlanMutant::SignTurned => "plan/sign-turned",
+            PlanMutant::DecodeOffset => "plan/decode-offset",
+            PlanMutant::DecodeScale => "plan/decode-scale",
+            PlanMutant::LastSampleCut => "plan/last-sample-cut",
+            PlanMutant::KnotMoved => "plan/knot-moved",
+            PlanMutant::ExtinctionScaled => "plan/extinction-scaled",
+            PlanMutant::RedBlueSwapped => "plan/red-blue-swapped",
+            PlanMutant::EndsEarly => "plan/ends-early",
+        }
+    }
+
+    /// The plan with this thing wrong.
+    pub fn apply(self, honest: &FramePlan) -> FramePlan {
+        let mut plan = honest.clone();
+        match self {
+            PlanMutant::AnchorHalfVoxel => plan.rays.anchor[0].x += 0.5,
+            PlanMutant::PixelCorner => shift_half_pixel(&mut plan),
+            PlanMutant::RowsFlipped => flip_rows(&mut plan),
+            PlanMutant::StepScaled => resample(&mut plan, |s| (s.step_world() * 1.05, s.rule(), s.mode())),
+            PlanMutant::PhaseHalfStep => plan.rays.anchor_past_start += 0.5 * plan.sampling.step_world(),
+            PlanMutant::NotNormalised => plan.rays.pixel = 0.0,
+            PlanMutant::Parallel => make_parallel(&mut plan),
+            PlanMutant::LeftRule => {
+                resample(&mut plan, |s| (s.step_world(), QuadratureRule::LeftExponential, s.mode()));
+            }
+            PlanMutant::DomainAtSamples => end_domain_at_samples(&mut plan),
+            PlanMutant::LastSegmentDropped => drop_last_segment(&mut plan),
+            PlanMutant::VisibleTooSmall => shrink_visible(&mut plan),
+            PlanMutant::BrickTransparent => hide_central_brick(&mut plan),
+            PlanMutant::IndexSwapped => swap_slots(&mut plan),
+            PlanMutant::WrongLevel => confuse_levels(&mut plan),
+            PlanMutant::BricksShifted => move_samples(&mut plan, |p, n| p.with_x((p.x + 1).min(n - 1))),
+            PlanMutant::BorderNotShared => move_samples(&mut plan, |p, n| p.min(UVec3::splat(n - 2))),
+            PlanMutant::BricksTransposed => move_samples(&mut plan, |p, _| UVec3::new(p.y, p.x, p.z)),
+            PlanMutant::BytesSwapped => edit_bytes(&mut plan, |sample| sample.reverse()),
+            PlanMutant::SignTurned => edit_bytes(&mut plan, |sample| sample[sample.len() - 1] ^= 0x80),
+            PlanMutant::DecodeOffset => redecode(&mut plan, |d, range| Decode { offset: d.offset + 0.01 * range, ..d }),
+            PlanMutant::DecodeScale => redecode(&mut plan, |d, _| Decode { scale: d.scale * 256.0 / 255.0, ..d }),
+            PlanMutant::LastSampleCut => plan.dims = (plan.dims - 1).max(UVec3::ONE),
+            PlanMutant::KnotMoved => move_knot(&mut plan),
+            PlanMutant::ExtinctionScaled => edit_knots(&mut plan, |k| k.extinction *= 1.02),
+            PlanMutant::RedBlueSwapped => edit_knots(&mut plan, |k| k.color.swap(0, 2)),
+            PlanMutant::EndsEarly => {
+                resample(&mut plan, |s| (s.step_world(), s.rule(), Mode::Fast { transmittance_floor: 0.25 }));
+                plan.features = plan.features.with(Feature::EarlyTermination);
+            }
+        }
+        plan
+    }
+}
+
+fn shift_half_pixel(plan: &mut FramePlan) {
+    for v in [&mut plan.rays.anchor, &mut plan.rays.direction] {
+        v[0] += 0.5 * (v[1] + v[2]);
+    }
+}
+
+fn flip_rows(plan: &mut FramePlan) {
+    plan.rays.anchor[2] *= -1.0;
+    plan.rays.direction[2] *= -1.0;
+}
+
+fn make_parallel(plan: &mut FramePlan) {
+    plan.rays.direction[1] = DVec3::ZERO;
+    plan.rays.direction[2] = DVec3::ZERO;
+    plan.rays.pixel = 0.0;
+}
+
+fn resample(plan: &mut FramePlan, change: impl Fn(&Sampling) -> (f64, QuadratureRule, Mode)) {
+    let (step, rule, mode) = change(&plan.sampling);
+    plan.sampling = Sampling::new(step, rule, mode).expect("a mutant's sampling is a sampling");
+}
+
+fn end_domain_at_samples(plan: &mut FramePlan) {
+    let last = plan.last_sample();
+    cut_domain(plan, Aabb { min: DVec3::ZERO, max: last });
+}
+
+/// Ends the domain one step of the central ray before its far end.
+fn drop_last_segment(plan: &mut FramePlan) {
+    let way = plan.rays.direction[0] * plan.sampling.step_world();
+    let Aabb { min, max } = plan.domain;
+    let back = way.clamp(-0.5 * (max - min), 0.5 * (max - min));
+    cut_domain(plan, Aabb { min: min - back.min(DVec3::ZERO), max: max - back.max(DVec3::ZERO) });
+}
+
+fn cut_domain(plan: &mut FramePlan, to: Aabb) {
+    plan.domain = plan.domain.intersection(&to);
+    plan.visible = plan.visible.intersection(&to);
+}
+
+fn shrink_visible(plan: &mut FramePlan) {
+    let extent = plan.visible.extent();
+    plan.visible.min += extent * 0.3;
+    plan.visible.max -= extent * 0.3;
+}
+
+fn hide_central_brick(plan: &mut FramePlan) {
+    let centre = plan.index.dims() / 2;
+    let level = plan.index.at(centre).level();
+    plan.index.fill(centre, IndexEntry::Transparent { level });
+    plan.features = plan.features.with(Feature::SkipTransparent);
+}
+
+/// Gives each of the two central bricks the other's slot.
+fn swap_slots(plan: &mut FramePlan) {
+    let words = plan.index.words_mut();
+    let slot = |w: u32| match IndexEntry::unpack(w) {
+        IndexEntry::Resident { slot, .. } => Some(slot),
+        IndexEntry::Transparent { .. } => None,
+    };
+    let middle = words.len() / 2;
+    let mut near: Vec<u32> =
+        words[middle..].iter().chain(words[..middle].iter().rev()).filter_map(|w| slot(*w)).collect();
+    near.dedup();
+    let (Some(&a), Some(&b)) = (near.first(), near.iter().find(|s| Some(*s) != near.first())) else { return };
+    for word in words {
+        if let IndexEntry::Resident { slot, level } = IndexEntry::unpack(*word) {
+            let other = if slot == a {
+                b
+            } else if slot == b {
+                a
+            } else {
+                slot
+            };
+            *word = IndexEntry::Resident { slot: other, level }.pack();
+        }
+    }
+}
+
+fn confuse_levels(plan: &mut FramePlan) {
+    for word in plan.index.words_mut() {
+        if let IndexEntry::Resident { slot, level } = IndexEntry::unpack(*word) {
+            let level = if level == Level(0) { Level(1) } else { Level(0) };
+            *word = IndexEntry::Resident { slot, level }.pack();
+        }
+    }
+    plan.features = plan.features.with(Feature::MultiLevel);
+}
+
+/// Every brick with the sample at `from(p, n)` at p.
+fn move_samples(plan: &mut FramePlan, from: impl Fn(UVec3, u32) -> UVec3) {
+    let (n, size) = (plan.bricks.side().n_samples(), plan.bricks.format().n_bytes());
+    let brick_bytes = plan.bricks.brick_bytes();
+    let at = |p: UVec3| size * (p.x + n * (p.y + n * p.z)) as usize;
+    let mut moved = (*plan.bricks).clone();
+    for (to, brick) in
+        moved.bytes_mut().chunks_exact_mut(brick_bytes).zip(plan.bricks.bytes().chunks_exact(brick_bytes))
+    {
+        for i in 0..n * n * n {
+            let p = UVec3::new(i % n, i / n % n, i / (n * n));
+            let source = at(from(p, n));
+            to[at(p)..][..size].copy_from_slice(&brick[source..][..size]);
+        }
+    }
+    plan.bricks = Arc::new(moved);
+}
+
+fn edit_bytes(plan: &mut FramePlan, edit: impl Fn(&mut [u8])) {
+    let size = plan.bricks.format().n_bytes();
+    let mut edited = (*plan.bricks).clone();
+    edited.bytes_mut().chunks_exact_mut(size).for_each(edit);
+    plan.bricks = Arc::new(edited);
+}
+
+fn redecode(plan: &mut FramePlan, change: impl Fn(Decode, f64) -> Decode) {
+    let decode = change(plan.bricks.decode(), transfer_range(plan));
+    let bricks = &plan.bricks;
+    let same = BrickSet::new(bricks.side(), bricks.format(), decode, bricks.bytes().to_vec());
+    plan.bricks = Arc::new(same.expect("whole bricks as before"));
+}
+
+fn transfer_range(plan: &FramePlan) -> f64 {
+    let knots = plan.transfer.knots();
+    knots[knots.len() - 1].value - knots[0].value
+}
+
+fn edit_knots(plan: &mut FramePlan, edit: impl FnMut(&mut Knot)) {
+    let mut knots = plan.transfer.knots().to_vec();
+    knots.iter_mut().for_each(edit);
+    plan.transfer = TransferFunction::new(knots).expect("a mutant's transfer function is one");
+}
+
+/// Moves all knots but the outer ones up, the lower ones by more; jumps stay jumps, and the order stays.
+fn move_knot(plan: &mut FramePlan) {
+    let range = transfer_range(plan);
+    let knots = plan.transfer.knots();
+    let (first, last) = (knots[0].value, knots[knots.len() - 1].value);
+    edit_knots(plan, |k| {
+        if first < k.value && k.value < last {
+            k.value += 0.05 * range * (last - k.value) / range;
+        }
+    });
+}

@@ -1,0 +1,172 @@
+//! The tolerance rules. They are rules, not magic: no case states a tolerance of its own.
+//!
+//! **Exact mode**, against the discrete f64 answer, all four channels: |difference| <= 1e-4 up to 2,048 samples a ray and
+//! 2.5e-4 up to 8,192; 99.9 % of the pixels within 1e-5. Both are wider by the reference's `ambiguity` of the pixel, and by
+//! nothing else. Longer rays have no rule: a case with longer rays is a defect.
+//!
+//! **Fast mode** adds, per pixel, what hardware filtering may do (`filter`) and, where a ray may end early, the
+//! transmittance floor: that is the most that any channel can lose behind the point where it ends.
+//! A tolerance so wide that the picture could be anything is no test: see [`Tolerance::is_empty_promise`].
+
+use brickfield::cpu::Discrete;
+use brickfield::frame::{Capabilities, FramePlan, Mode};
+use brickfield_core::glam::UVec2;
+use brickfield_core::{Image, TransferFunction};
+
+use crate::metrics::{Errors, MetricError, errors, quantile};
+
+use super::filter::filter_bound;
+
+/// The share of pixels that must be within the narrow bound.
+const BULK: f64 = 0.999;
+/// The narrow bound of exact mode.
+const BULK_BOUND: f64 = 1e-5;
+/// What three quarters of a fast picture's pixels must be held to at least.
+const EMPTY_PROMISE: f64 = 0.2;
+
+/// What each pixel may differ by, in every channel; rows from the top.
+#[derive(Clone, Debug)]
+pub struct Tolerance {
+    /// No pixel may differ by more.
+    most: Vec<f64>,
+    /// [`BULK`] of the pixels may not differ by more.
+    bulk: Vec<f64>,
+}
+
+/// How far a picture was from what was asked, and what the rule says.
+#[derive(Clone, Debug)]
+pub struct Verdict {
+    /// The errors, where the picture could be compared at all.
+    pub errors: Option<Errors>,
+    /// The pixel that is farthest beyond (or nearest to) its bound, and that bound.
+    pub closest: Option<(UVec2, f64)>,
+    /// Why the picture fails.
+    pub complaint: Option<Complaint>,
+}
+
+/// Why a picture fails.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)]
+pub enum Complaint {
+    #[error("pixel ({}, {}) differs by {difference:.3e}; the rule allows {bound:.3e}", pixel.x, pixel.y)]
+    Worst { pixel: UVec2, difference: f64, bound: f64 },
+    #[error("{n_beyond} of {n_pixels} pixels differ by more than the narrow bound; {n_allowed} may")]
+    Bulk { n_beyond: usize, n_pixels: usize, n_allowed: usize },
+    #[error("pixel ({}, {}): {what}", pixel.x, pixel.y)]
+    Bounded { pixel: UVec2, what: &'static str },
+    #[error(transparent)]
+    NotComparable(#[from] MetricError),
+    #[error("rays of {n_samples} samples: the rules end at 8192")]
+    NoRule { n_samples: u64 },
+    #[error("a quarter of the pixels may differ by more than {bound:.2}: the tolerance promises nothing")]
+    EmptyPromise { bound: f64 },
+    #[error("the reference differs from the volume's own sum by {difference:.3e} at pixel ({}, {}): the plan is wrong", pixel.x, pixel.y)]
+    Oracle { pixel: UVec2, difference: f64 },
+}
+
+impl Tolerance {
+    /// The rule for a plan on a device, given the plan's discrete answer.
+    ///
+    /// # Errors
+    /// Rays that are too long for any rule.
+    pub fn of(plan: &FramePlan, reference: &Discrete, device: &Capabilities) -> Result<Tolerance, Complaint> {
+        let most = most_difference(plan)?;
+        let exact = |bound: f64| reference.ambiguity.iter().map(|a| bound + a).collect::<Vec<f64>>();
+        let Mode::Fast { transmittance_floor } = plan.sampling.mode() else {
+            return Ok(Tolerance { most: exact(most), bulk: exact(BULK_BOUND) });
+        };
+        let filter = filter_bound(plan, device.sub_texel_bits);
+        let ends = |i: usize| {
+            let transmittance = 1.0 - reference.image.pixels()[i][3];
+            if transmittance <= transmittance_floor + filter[i] + most { transmittance_floor } else { 0.0 }
+        };
+        let fast = |exact: Vec<f64>| exact.iter().enumerate().map(|(i, e)| e + filter[i] + ends(i)).collect();
+        Ok(Tolerance { most: fast(exact(most)), bulk: fast(exact(BULK_BOUND)) })
+    }
+
+    /// The bound that a quarter of the pixels exceeds, if it is so wide that hardly anything could fail.
+    pub fn is_empty_promise(&self) -> Option<f64> {
+        let bound = quantile(self.most.clone(), 0.75);
+        (bound > EMPTY_PROMISE).then_some(bound)
+    }
+
+    /// Holds a picture against its reference.
+    pub fn judge(&self, image: &Image<f32>, reference: &Image<f64>) -> Verdict {
+        let errors = match errors(image, reference) {
+            Ok(errors) => errors,
+            Err(e) => return Verdict { errors: None, closest: None, complaint: Some(e.into()) },
+        };
+        let by_pixel = differences(image, reference);
+        let excess = |i: &usize| by_pixel[*i] - self.most[*i];
+        let i = (0..by_pixel.len()).max_by(|a, b| excess(a).total_cmp(&excess(b))).unwrap_or(0);
+        let closest = (pixel(image.size(), i), self.most[i]);
+        let complaint = self.beyond(i, &by_pixel, closest.0).or_else(|| self.bulk_beyond(&by_pixel));
+        Verdict { errors: Some(errors), closest: Some(closest), complaint }
+    }
+
+    fn beyond(&self, i: usize, by_pixel: &[f64], pixel: UVec2) -> Option<Complaint> {
+        let (difference, bound) = (by_pixel[i], self.most[i]);
+        (difference > bound).then_some(Complaint::Worst { pixel, difference, bound })
+    }
+
+    fn bulk_beyond(&self, by_pixel: &[f64]) -> Option<Complaint> {
+        let n_pixels = by_pixel.len();
+        let n_beyond = by_pixel.iter().zip(&self.bulk).filter(|(d, b)| d > b).count();
+        let n_allowed = (n_pixels as f64 * (1.0 - BULK) + 1e-9).floor() as usize;
+        (n_beyond > n_allowed).then_some(Complaint::Bulk { n_beyond, n_pixels, n_allowed })
+    }
+}
+
+/// What holds for every picture, whatever its reference: 0 <= alpha <= 1, and colours within alpha times the transfer
+/// function's greatest, to rounding.
+pub(crate) fn bounded(image: &Image<f32>, transfer: &TransferFunction) -> Option<Complaint> {
+    let greatest = |c: usize| transfer.knots().iter().map(|k| k.color[c]).fold(0.0, f64::max);
+    let hull = [greatest(0), greatest(1), greatest(2)];
+    let wrong = |p: &[f32; 4]| {
+        let [r, g, b, a] = p.map(f64::from);
+        let within = |(c, h): (f64, f64)| (-1e-6..=a * h * (1.0 + 1e-5) + 1e-5).contains(&c);
+        match () {
+            () if p.iter().any(|v| !v.is_finite()) => Some("a channel is not finite"),
+            () if !(-1e-6..=1.0 + 1e-6).contains(&a) => Some("alpha is not within 0 and 1"),
+            () if ![r, g, b].into_iter().zip(hull).all(within) => Some("a colour is outside the transfer function's"),
+            () => None,
+        }
+    };
+    let (i, what) = image.pixels().iter().enumerate().find_map(|(i, p)| wrong(p).map(|w| (i, w)))?;
+    Some(Complaint::Bounded { pixel: pixel(image.size(), i), what })
+}
+
+/// Greatest difference of any channel, pixel by pixel.
+pub(crate) fn differences(image: &Image<f32>, reference: &Image<f64>) -> Vec<f64> {
+    let greatest = |(a, b): (&[f32; 4], &[f64; 4])| (0..4).map(|c| (f64::from(a[c]) - b[c]).abs()).fold(0.0, f64::max);
+    image.pixels().iter().zip(reference.pixels()).map(greatest).collect()
+}
+
+pub(crate) fn pixel(size: UVec2, i: usize) -> UVec2 {
+    UVec2::new(i as u32 % size.x.max(1), i as u32 / size.x.max(1))
+}
+
+/// The widest difference of exact mode for a plan's longest rays.
+fn most_difference(plan: &FramePlan) -> Result<f64, Complaint> {
+    match longest_ray(plan) {
+        0..=2048 => Ok(1e-4),
+        2049..=8192 => Ok(2.5e-4),
+        n_samples => Err(Complaint::NoRule { n_samples }),
+    }
+}
+
+/// Most samples on any ray: the domain's diagonal in steps, along the direction that is slowest through it.
+fn longest_ray(plan: &FramePlan) -> u64 {
+    let size = plan.size();
+    let ray = |i: u32| plan.rays.ray(i % size.x, i / size.x);
+    let samples = |i: u32| {
+        let ray = ray(i);
+        let far = brickfield_core::Ray {
+            origin: plan.rays.center + ray.anchor - ray.direction * (ray.t_anchor + plan.rays.start),
+            direction: ray.direction,
+        };
+        far.clip(&plan.domain).map_or(0.0, |s| (s.end - s.start) / plan.sampling.step_world())
+    };
+    let most = (0..size.x * size.y).map(samples).fold(0.0, f64::max);
+    most.ceil() as u64 * plan.sampling.rule().nodes().len() as u64
+}

@@ -1,0 +1,74 @@
+//! Where interpolated values come from: the eight samples around a position.
+
+use brickfield::frame::{FramePlan, IndexEntry};
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{ValueRange, Volume};
+
+/// The eight data values around a position, x varying fastest, and where it lies between them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cell {
+    values: [f64; 8],
+    fraction: DVec3,
+}
+
+/// Something that has samples around a position in sample space.
+pub(crate) trait Samples: Sync {
+    /// The cell that holds `q`; `None` where nothing is visible.
+    fn cell(&self, q: DVec3) -> Option<Cell>;
+}
+
+/// A volume's own voxels: neither bricks nor an index.
+pub(crate) struct VolumeSamples<'a>(pub(crate) &'a Volume);
+
+/// The bricks of a plan.
+pub(crate) struct PlanSamples<'a>(pub(crate) &'a FramePlan);
+
+impl Cell {
+    /// The trilinear value: the weighted sum of the corners.
+    pub(crate) fn value(&self) -> f64 {
+        let weight =
+            |axis: usize, c: usize| if c >> axis & 1 == 1 { self.fraction[axis] } else { 1.0 - self.fraction[axis] };
+        self.values.iter().enumerate().map(|(c, v)| v * weight(0, c) * weight(1, c) * weight(2, c)).sum()
+    }
+
+    /// Least and greatest of the corners.
+    pub(crate) fn range(&self) -> ValueRange {
+        let start = ValueRange { min: self.values[0], max: self.values[0] };
+        self.values.iter().fold(start, |r, v| ValueRange { min: r.min.min(*v), max: r.max.max(*v) })
+    }
+}
+
+impl Samples for VolumeSamples<'_> {
+    fn cell(&self, q: DVec3) -> Option<Cell> {
+        let dims = self.0.grid().dims();
+        let last = (dims - 1).as_dvec3();
+        let q = q.clamp(DVec3::ZERO, last);
+        let low = q.floor().min((last - 1.0).max(DVec3::ZERO));
+        let corner =
+            |c: usize| (low.as_uvec3() + UVec3::new(c as u32 & 1, c as u32 >> 1 & 1, c as u32 >> 2)).min(dims - 1);
+        let value = |c: usize| {
+            let p = corner(c);
+            self.0.voxels().at(p.x as usize + dims.x as usize * (p.y as usize + dims.y as usize * p.z as usize))
+        };
+        Some(Cell { values: std::array::from_fn(value), fraction: q - low })
+    }
+}
+
+impl Samples for PlanSamples<'_> {
+    fn cell(&self, q: DVec3) -> Option<Cell> {
+        let plan = self.0;
+        let n = plan.bricks.side().n_samples() as usize;
+        let q = q.clamp(DVec3::ZERO, plan.last_sample());
+        let at = (q / (n - 1) as f64).floor().as_uvec3().min(plan.index.dims() - 1);
+        let IndexEntry::Resident { slot, level } = plan.index.at(at) else { return None };
+        let first = (at >> u32::from(level.0) << u32::from(level.0)).as_dvec3() * (n - 1) as f64;
+        let s = (q - first) / f64::from(level.stride());
+        let low = s.floor().clamp(DVec3::ZERO, DVec3::splat((n - 2) as f64));
+        let value = |c: usize| {
+            let p = low.as_uvec3() + UVec3::new(c as u32 & 1, c as u32 >> 1 & 1, c as u32 >> 2);
+            let i = p.x as usize + n * (p.y as usize + n * p.z as usize);
+            plan.bricks.decode().value(plan.bricks.read(slot as usize * n.pow(3) + i))
+        };
+        Some(Cell { values: std::array::from_fn(value), fraction: s - low })
+    }
+}

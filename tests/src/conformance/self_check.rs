@@ -1,0 +1,126 @@
+//! The check of the checks: every case must catch the mutants that it names, and every mutant must be named.
+//!
+//! A mutant is a backend with one thing wrong, run on the real path. Plan mutants run on the first backend there is,
+//! shader mutants on the first that compiles shaders: they change the sources that both share.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::case::{Case, Mutant};
+use super::check::{Judged, Obstacle, Prepared};
+use super::contestant::Contestant;
+use super::outcome::{Outcome, Status};
+
+/// Holds cases against their mutants.
+pub struct SelfCheck<'a> {
+    contestants: &'a mut [Contestant],
+    patched: BTreeMap<Mutant, Result<Contestant, String>>,
+    caught: BTreeSet<Mutant>,
+    run: BTreeSet<Mutant>,
+}
+
+/// What became of a mutant in a case.
+enum Fate {
+    Caught,
+    Survived(String),
+    NotRun(String),
+}
+
+impl<'a> SelfCheck<'a> {
+    /// With these backends.
+    pub fn new(contestants: &'a mut [Contestant]) -> SelfCheck<'a> {
+        SelfCheck { contestants, patched: BTreeMap::new(), caught: BTreeSet::new(), run: BTreeSet::new() }
+    }
+
+    /// Runs a case against the mutants that it names. It passes if it catches all of those that can be run here, and at
+    /// least one.
+    pub fn case(&mut self, case: &Case) -> Outcome {
+        let plain = |status, note: String| Outcome::plain(&case.name, "mutants", status, note);
+        if case.mutants.is_empty() {
+            return plain(Status::Fail, "names no mutant that it must catch".into());
+        }
+        let prepared = match Prepared::of(case) {
+            Ok(prepared) => prepared,
+            Err(Obstacle::NoData(e)) => return plain(Status::NoData, e.to_string()),
+            Err(e) => return plain(Status::Fail, e.to_string()),
+        };
+        let (mut caught, mut survivors, mut not_run) = (Vec::new(), Vec::new(), Vec::new());
+        for mutant in &case.mutants {
+            match self.fate(&prepared, mutant) {
+                Fate::Caught => caught.push(mutant.name()),
+                Fate::Survived(how) => survivors.push(format!("{mutant} ({how})")),
+                Fate::NotRun(why) => not_run.push(format!("{mutant} ({why})")),
+            }
+        }
+        match (survivors.is_empty(), caught.is_empty()) {
+            (false, _) => plain(Status::Fail, format!("survived: {}", survivors.join(", "))),
+            (true, true) => plain(Status::NoDevice, format!("not run: {}", not_run.join(", "))),
+            (true, false) => plain(Status::Pass, format!("caught {}", caught.join(", "))),
+        }
+    }
+
+    /// Mutants that no case has caught: one failure each, or no device if it could not be run.
+    pub fn uncaught(&self) -> Vec<Outcome> {
+        let missing = Mutant::all().into_iter().filter(|m| !self.caught.contains(m));
+        let outcome = |m: Mutant| match self.run.contains(&m) || self.can_run(&m) {
+            true => Outcome::plain(m.name(), "mutants", Status::Fail, "no case has caught it"),
+            false => Outcome::plain(m.name(), "mutants", Status::NoDevice, "no backend to run it on"),
+        };
+        missing.map(outcome).collect()
+    }
+
+    /// How many mutants were caught, of how many.
+    pub fn n_caught(&self) -> (usize, usize) {
+        (self.caught.len(), Mutant::all().len())
+    }
+
+    fn can_run(&self, mutant: &Mutant) -> bool {
+        self.contestants.iter().any(|c| c.can_run(mutant))
+    }
+
+    fn fate(&mut self, prepared: &Prepared, mutant: &Mutant) -> Fate {
+        let judged = match mutant {
+            Mutant::Plan(_) => match self.contestants.iter_mut().find(|c| c.can_run(mutant)) {
+                Some(contestant) => prepared.run(contestant, Some(mutant)),
+                None => return Fate::NotRun("no backend".into()),
+            },
+            Mutant::Shader(_) => match self.patched(mutant) {
+                Some(Ok(contestant)) => prepared.run(contestant, Some(mutant)),
+                Some(Err(e)) => return Fate::Survived(e.clone()),
+                None => return Fate::NotRun("no backend with shaders".into()),
+            },
+        };
+        self.run.insert(*mutant);
+        let fate = fate_of(judged);
+        if matches!(fate, Fate::Caught) {
+            self.caught.insert(*mutant);
+        }
+        fate
+    }
+
+    /// A backend that compiles the mutant's shaders, opened once.
+    fn patched(&mut self, mutant: &Mutant) -> Option<&mut Result<Contestant, String>> {
+        let Mutant::Shader(shader) = mutant else { return None };
+        let honest = self.contestants.iter().find(|c| c.can_run(mutant))?;
+        let open = || match shader.apply() {
+            Err(e) => Err(e.to_string()),
+            Ok(library) => honest.with_library(library).ok_or_else(|| "cannot be opened with other shaders".to_owned()),
+        };
+        Some(self.patched.entry(*mutant).or_insert_with(open))
+    }
+}
+
+/// A picture beyond the rule and a function beyond its tolerance are caught. So is a mutant that the backend refuses to
+/// compile or run: but that proves nothing about the case, and counts as a survivor.
+fn fate_of(judged: Judged) -> Fate {
+    match judged {
+        Judged::Picture(_, verdict) => match verdict.complaint {
+            Some(_) => Fate::Caught,
+            None => Fate::Survived(verdict.errors.map_or(String::new(), |e| format!("max {:.1e}", e.worst.difference))),
+        },
+        Judged::Function(Err(_)) => Fate::Caught,
+        Judged::Function(Ok(worst)) => Fate::Survived(format!("{worst:.2} of the tolerance")),
+        Judged::Absent => Fate::NotRun("absent".into()),
+        Judged::Unsupported(e) | Judged::Broken(e) => Fate::Survived(e.to_string()),
+        Judged::Panicked(words) => Fate::Survived(format!("panicked: {words}")),
+    }
+}

@@ -1,0 +1,121 @@
+//! Shaders with one thing wrong: a patch of the source text that backends compile, so the whole real path runs.
+
+use brickfield_shaders::{PatchError, ShaderLibrary};
+
+/// One thing wrong with the shader sources.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ShaderMutant {
+    /// The mutant's name in reports.
+    pub name: &'static str,
+    module: &'static str,
+    from: &'static str,
+    to: &'static str,
+}
+
+impl ShaderMutant {
+    /// The sources with this thing wrong.
+    ///
+    /// # Errors
+    /// If the sources have changed so that the patch does not fit: then the mutant needs a new one.
+    pub fn apply(&self) -> Result<ShaderLibrary, PatchError> {
+        ShaderLibrary::embedded().patched(self.module, self.from, self.to)
+    }
+}
+
+macro_rules! mutants {
+    ($($(#[$doc:meta])* $id:ident: $name:literal, $module:literal, $from:literal => $to:literal;)*) => {
+        $($(#[$doc])* pub const $id: ShaderMutant =
+            ShaderMutant { name: concat!("shader/", $name), module: $module, from: $from, to: $to };)*
+        /// All shader mutants.
+        pub const ALL: &[ShaderMutant] = &[$($id),*];
+    };
+}
+
+mutants! {
+    /// The nearest sample instead of the trilinear value.
+    NEAREST: "nearest", "bricks", "let f = s - cell;" => "let f = floor(s - cell + 0.5);";
+    /// The wrong weight along y.
+    LERP_SWAPPED: "lerp-swapped", "bricks", "return lerp(lerp(x00, x10, f.y), lerp(x01, x11, f.y), f.z);"
+        => "return lerp(lerp(x00, x10, f.x), lerp(x01, x11, f.x), f.z);";
+    /// Positions are not clamped to the first and last sample.
+    NO_CLAMP: "no-clamp", "bricks", "let s = clamp(local(block, p), vec3f(0.0), block.last);"
+        => "let s = local(block, p);";
+    /// Index rows are as long as columns.
+    INDEX_STRIDE: "index-stride", "bricks", "index[cell.x + dims.x * (cell.y + dims.y * cell.z)]"
+        => "index[cell.x + dims.y * (cell.y + dims.x * cell.z)]";
+    /// The next slot's brick.
+    ATLAS_ROW: "atlas-row", "bricks", "let row = slot / bricks.x;" => "let row = slot / bricks.y;";
+    /// Coarse bricks are read as if they were fine.
+    LEVEL_SCALE: "level-scale", "bricks", "block.scale = 1.0 / f32(1u << level);" => "block.scale = 1.0;";
+    /// Coarse bricks begin at the cell, not at their block.
+    BLOCK_CORNER: "block-corner", "bricks", "let first = (cell >> vec3u(level)) << vec3u(level);" => "let first = cell;";
+    /// The hardware filter looks half a texel beside.
+    HALF_TEXEL: "half-texel", "bricks", "(texel + s + 0.5)" => "(texel + s)";
+    /// alpha = tau h.
+    ALPHA_LINEAR: "alpha-linear", "scalar", "select(1.0 - exp(-x), series, x < 0.25)" => "min(x, 1.0)";
+    /// alpha = 1 - e^-x at every x: no digits near 0.
+    ALPHA_CANCELS: "alpha-cancels", "scalar", "select(1.0 - exp(-x), series, x < 0.25)" => "1.0 - exp(-x)";
+    /// depth = alpha for thin segments.
+    DEPTH_LINEAR: "depth-linear", "scalar", "select(direct, series, a < 0.25)" => "select(direct, a, a < 0.25)";
+    /// Segments do not attenuate themselves.
+    NO_SELF_ATTENUATION: "no-self-attenuation", "quadrature", "vec4f(alpha(d) * optics.rgb, d)"
+        => "vec4f(d * optics.rgb, d)";
+    /// Segments are not attenuated by those before.
+    NO_ATTENUATION: "no-attenuation", "quadrature", "ray.rgb + exp(-ray.w) * segment.rgb" => "ray.rgb + segment.rgb";
+    /// The far Gauss node is not behind the near one.
+    GAUSS_UNWEIGHTED: "gauss-unweighted", "quadrature", "near.w + far.w * exp(-0.57735027 * d)" => "near.w + far.w";
+    /// A Gauss node at a quarter of the segment.
+    GAUSS_NODE: "gauss-node", "quadrature", "const FIRST_NODE: f32 = 0.21132486540518713;" => "const FIRST_NODE: f32 = 0.25;";
+    /// Euler's opacity is not depth.
+    EULER_DEPTH: "euler-depth", "quadrature", "vec4f(a * optics.rgb, depth(a))" => "vec4f(a * optics.rgb, a)";
+    /// The value at the start of the midpoint rule's segments.
+    MIDPOINT_LEFT: "midpoint-left", "quadrature", "const FIRST_NODE: f32 = 0.5;" => "const FIRST_NODE: f32 = 0.0;";
+    /// Pre-integrated pieces have the mean colour of their ends.
+    PIECE_MEAN: "piece-mean", "preintegrated", "(2.0 * near.w + far.w) / (3.0 * max(total, 1e-37))" => "0.5";
+    /// The transfer function is continuous from the left.
+    LEFT_CONTINUOUS: "left-continuous", "transfer", "knots[next].value.x <= value" => "knots[next].value.x < value";
+    /// The transfer function goes on beyond its last knot.
+    NOT_CONSTANT_OUTSIDE: "not-constant-outside", "transfer", "clamp((value - low.value.x) * low.value.y, 0.0, 1.0)"
+        => "(value - low.value.x) * low.value.y";
+    /// Steps instead of lines between knots.
+    STEPS: "steps", "transfer", "low.optics + (high - low.optics) * f" => "low.optics";
+    /// Rays pass the pixels' corners.
+    PIXEL_CORNER: "pixel-corner", "rays", "let at = pixel + 0.5 - 0.5 * vec2f(frame.size.xy);"
+        => "let at = pixel - 0.5 * vec2f(frame.size.xy);";
+    /// Directions are not normalised.
+    NOT_NORMALISED: "not-normalised", "rays", "let length = sqrt(1.0 + square);" => "let length = 1.0;";
+    /// The phase of the shells is that of a plane.
+    FLAT_SHELLS: "flat-shells", "rays", "frame.anchor_down.w * (square / (1.0 + length))" => "0.0";
+    /// The first segment is not shortened.
+    FIRST_NOT_CUT: "first-not-cut", "march", "select(boundary(ray, k), walk.span.start, k == walk.first)"
+        => "boundary(ray, k)";
+    /// The last segment is not shortened.
+    LAST_NOT_CUT: "last-not-cut", "march", "select(boundary(ray, k + 1.0), walk.span.end, k == walk.last)"
+        => "boundary(ray, k + 1.0)";
+    /// The first segment is dropped.
+    FIRST_DROPPED: "first-dropped", "march", "walk.first = floor(" => "walk.first = ceil(";
+    /// The last segment is dropped.
+    LAST_DROPPED: "last-dropped", "march", "walk.last = ceil(segments_before(ray, walk.span.end)) - 1.0;"
+        => "walk.last = ceil(segments_before(ray, walk.span.end)) - 2.0;";
+    /// A brick keeps the ray for two segments too many.
+    OVERSTAYS: "overstays", "march", "stop = max(k + 1.0, min(stop, min(walk.end, walk.last)));"
+        => "stop = max(k + 1.0, min(stop + 2.0, min(walk.end, walk.last)));";
+    /// A jump over a transparent block goes 24 segments too far: two reach only the dark rim of what follows.
+    JUMPS_TOO_FAR: "jumps-too-far", "march", "k = stop;" => "k = stop + 24.0;";
+    /// Rays end at a transmittance of 1/5.
+    ENDS_EARLY: "ends-early", "march", "exp(-seen.w) < frame.direction_down.w" => "exp(-seen.w) < 0.2";
+    /// Opacity is the depth.
+    OPACITY_IS_DEPTH: "opacity-is-depth", "march", "vec4f(seen.rgb, alpha(seen.w))" => "vec4f(seen.rgb, min(seen.w, 1.0))";
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_patch_fits_the_sources() {
+        for mutant in ALL {
+            assert_ne!(mutant.apply().unwrap(), ShaderLibrary::embedded(), "{}", mutant.name);
+        }
+    }
+}
