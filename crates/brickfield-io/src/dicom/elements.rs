@@ -36,17 +36,27 @@ struct Header {
 const MAX_DEPTH: usize = 32;
 
 /// Checks from the current position to the end of the pixel data that no element is longer than the source, and that
-/// sequences are not nested without end.
-pub(super) fn check_lengths(source: &mut dyn ByteSource, syntax: Syntax) -> Result<(), ReadError> {
+/// sequences are not nested without end. Returns the position after what was checked: the parser must not go beyond.
+pub(super) fn check_lengths(source: &mut dyn ByteSource, syntax: Syntax) -> Result<u64, ReadError> {
+    let n_unchecked = walk(source, syntax)?;
+    let end = source.stream_position().map_err(|e| ReadError::io("the data set", e))? + n_bytes_left(source)?;
+    Ok(end - n_unchecked)
+}
+
+/// Walks to the end of the pixel data; the bytes left after it.
+fn walk(source: &mut dyn ByteSource, syntax: Syntax) -> Result<u64, ReadError> {
     let mut n_left = n_bytes_left(source)?;
     let mut nest = Nest { ends: Vec::new() };
     let mut in_pixel_items = false;
     loop {
         nest.leave_ended(n_left);
-        let Some((header, n_header_bytes)) = read_header(source, syntax)? else { return Ok(()) };
+        let Some((header, n_header_bytes)) = read_header(source, syntax)? else { return Ok(0) };
         n_left = n_left.saturating_sub(n_header_bytes);
         if header.tag == ITEM_END || header.tag == SEQUENCE_END {
             nest.leave_delimited();
+            if in_pixel_items && nest.ends.is_empty() {
+                return Ok(n_left);
+            }
             continue;
         }
         if header.length != UNDEFINED {
@@ -62,7 +72,7 @@ pub(super) fn check_lengths(source: &mut dyn ByteSource, syntax: Syntax) -> Resu
         skip(source, u64::from(header.length))?;
         n_left -= u64::from(header.length);
         if is_pixel_data {
-            return Ok(());
+            return Ok(n_left);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What one file says about its slice.
 
-use std::io::SeekFrom;
+use std::io::{Read, SeekFrom};
 
 use brickfield_core::ScalarType;
 use brickfield_core::glam::DVec3;
@@ -96,14 +96,14 @@ pub(super) fn read_object(source: &mut dyn ByteSource, part: Part) -> Result<Def
         return Err(ReadError::WrongMagic { format: Format::Dicom, what: "byte 128", found, expected: "DICM" });
     }
     let syntax = known_syntax(&read_transfer_syntax(source)?)?;
-    check_lengths(source, syntax)?;
+    let end = check_lengths(source, syntax)?;
     source.seek(SeekFrom::Start(0)).map_err(|e| ReadError::io("the data set", e))?;
     let options = OpenFileOptions::new().read_preamble(ReadPreamble::Always);
     let options = match part {
         Part::BeforePixels => options.read_until(tags::PIXEL_DATA),
         Part::WithPixels => options.read_to(tags::PIXEL_DATA),
     };
-    options.from_reader(source).map_err(|e| ReadError::decoder("the data set", e))
+    options.from_reader(source.take(end)).map_err(|e| ReadError::decoder("the data set", e))
 }
 
 fn known_syntax(uid: &str) -> Result<Syntax, ReadError> {

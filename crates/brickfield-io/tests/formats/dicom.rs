@@ -289,6 +289,9 @@ fn lengths_beyond_the_file_are_refused_before_they_are_allocated() {
     let mut short = whole.clone();
     short[140..144].copy_from_slice(&[0; 4]);
     assert_eq!(read(short).unwrap_err().to_string(), "TransferSyntaxUID is missing");
+    // Found by fuzzing: the parser goes on after the pixel data where tags are lower.
+    let junk = [whole.clone(), [0; 24].to_vec(), b"\x02\0\x02\0UN\0\0\x02\0\x55\x49".to_vec()].concat();
+    assert_eq!(read(junk).unwrap().volume.voxels(), &Voxels::U16(vec![0; 6]));
     let mut huge = whole.clone();
     let at = whole.len() - 12 - 4;
     huge[at..at + 4].copy_from_slice(&0xffff_fff0u32.to_le_bytes());
