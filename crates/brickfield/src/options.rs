@@ -20,7 +20,8 @@ pub struct InputOptions {
     /// Most bytes that the voxels may take, in MiB
     #[arg(long, value_name = "MIB", default_value_t = Limits::default().max_bytes >> 20)]
     pub max_mib: u64,
-    /// Read FILE as raw voxels: "NXxNYxNZ,TYPE[,big][,skip=BYTES][,spacing=SX:SY:SZ]", TYPE being u8 to f64
+    /// Read FILE as raw voxels: `NXxNYxNZ,TYPE` with TYPE u8 to f64; then, each if needed, `,big` `,skip=BYTES`
+    /// `,spacing=SX:SY:SZ`
     #[arg(long, value_name = "SPEC", value_parser = raw_spec)]
     pub raw: Option<RawSpec>,
 }

@@ -4,7 +4,7 @@
 //!
 //! Slices are sorted by position along their normal and kept as they are: none is resampled. Gantry tilt becomes a
 //! sheared grid, which is exact. Uneven steps cannot be a grid; it gets the median step, and
-//! [`Note::UnevenSpacing`](crate::Note::UnevenSpacing) has all positions, so that nothing is lost.
+//! [`Note::UnevenSpacing`] has all positions, so that nothing is lost.
 
 mod elements;
 mod pixels;
