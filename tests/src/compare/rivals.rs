@@ -1,7 +1,7 @@
 //! The backends that are compared, and those that are absent.
 
 use brickfield::frame::{Backend, Description};
-use brickfield::{BackendKind, Validation, open_backend};
+use brickfield::{BackendError, BackendKind, Validation, open_backend};
 
 use super::CompareError;
 use crate::report::BackendInfo;
@@ -26,6 +26,8 @@ impl Rivals {
                     rivals.infos.push(present(backend.describe()));
                     rivals.present.push(backend);
                 }
+                // The report names the backend itself.
+                Err(BackendError::Unavailable { reason, .. }) => rivals.infos.push(absent(kind, reason)),
                 Err(e) => rivals.infos.push(absent(kind, e.to_string())),
             }
         }
