@@ -54,6 +54,26 @@ pub struct Subject {
     pub scene: Scene,
     /// Who else knows the picture.
     pub oracle: Oracle,
+    /// Whether there is anything to see.
+    pub shows: Shows,
+}
+
+/// Whether a picture shows anything.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Shows {
+    Something,
+    Nothing,
+}
+
+impl Shows {
+    /// In words.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Shows::Something => "something",
+            Shows::Nothing => "nothing",
+        }
+    }
 }
 
 /// A second answer, that shares no code with `prepare`.

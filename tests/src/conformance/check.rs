@@ -7,7 +7,7 @@ use brickfield::cpu::{Discrete, discrete};
 use brickfield::frame::{Capabilities, RenderError};
 use brickfield_core::Image;
 
-use super::case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, Plans, Subject};
+use super::case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, Plans, Shows, Subject};
 use super::contestant::Contestant;
 use super::naive::naive;
 use super::rule::{Complaint, Tolerance, Verdict, bounded};
@@ -65,6 +65,7 @@ impl Prepared {
                 let subject = Box::new(subject()?);
                 let plans = Box::new(subject.plans()?);
                 let reference = discrete(&plans.complete);
+                check_blank(&subject, &reference)?;
                 check_oracle(&subject, &reference)?;
                 Work::Picture { subject, plans, reference }
             }
@@ -109,6 +110,18 @@ impl Prepared {
 fn words(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(|s| (*s).to_owned());
     text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default()
+}
+
+/// A case that shows nothing by accident tests nothing.
+fn check_blank(subject: &Subject, reference: &Discrete) -> Result<(), Complaint> {
+    let found = match reference.image.pixels().iter().any(|p| p[3] > 1e-6) {
+        true => Shows::Something,
+        false => Shows::Nothing,
+    };
+    match found == subject.shows {
+        true => Ok(()),
+        false => Err(Complaint::Blank { found: found.name(), stated: subject.shows.name() }),
+    }
 }
 
 fn check_oracle(subject: &Subject, reference: &Discrete) -> Result<(), Complaint> {
@@ -170,7 +183,7 @@ fn run_picture(
 }
 
 fn refused(complaint: Complaint) -> Judged {
-    let verdict = Verdict { errors: None, closest: None, complaint: Some(complaint) };
+    let verdict = Verdict { errors: None, closest: None, used: f64::INFINITY, complaint: Some(complaint) };
     Judged::Picture(Image::transparent(brickfield_core::glam::UVec2::ZERO), verdict)
 }
 

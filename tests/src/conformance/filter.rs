@@ -5,7 +5,7 @@
 //! difference along that axis, so all three by at most 3 2^-b R, R being the range of the cell's eight samples.
 //!
 //! **Codes.** Texture units may filter 8-bit texels in 8-bit arithmetic (llvmpipe does): each of the three steps of
-//! interpolation then rounds to a code, which moves the value by at most [`CODES`] codes, whatever R is.
+//! interpolation then rounds to the nearest code: at most [`CODES`] codes in all, whatever R is.
 //!
 //! **Pixel.** A node whose value may lie anywhere in v +- dv may have any extinction and colour that the transfer
 //! function has there: this is where its slope enters, exactly and on both sides of knots and jumps. A segment that may have
@@ -21,8 +21,8 @@ use rayon::prelude::*;
 use super::naive::pieces;
 use super::samples::{PlanSamples, Samples};
 
-/// Rounding of an 8-bit filter: three steps, each to the next code below or above.
-const CODES: f64 = 3.0;
+/// Rounding of an 8-bit filter: three steps, half a code each.
+const CODES: f64 = 1.5;
 
 /// A node's value, and how far it may be off.
 #[derive(Clone, Copy, Debug)]

@@ -21,7 +21,7 @@ mod samples;
 mod self_check;
 pub mod shader_mutants;
 
-pub use case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, Plans, Point, Subject};
+pub use case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, Plans, Point, Shows, Subject};
 pub use cases::all as cases;
 pub use check::{Judged, Obstacle, Prepared};
 pub use contestant::Contestant;

@@ -50,7 +50,8 @@ pub(crate) fn naive(volume: &Volume, scene: &Scene) -> Image<f64> {
 /// The world ray of a pixel and where it runs in what is shown.
 pub(crate) fn world_span(volume: &Volume, scene: &Scene, x: u32, y: u32) -> (Ray, Option<Span>) {
     let ray = scene.camera.pixel_rays(scene.size).pixel_ray(x, y);
-    (ray, in_index_space(volume, &ray).clip(&shown(volume, scene)))
+    let shown = shown(volume, scene);
+    (ray, if shown.is_empty() { None } else { in_index_space(volume, &ray).clip(&shown) })
 }
 
 fn pixel_of(volume: &Volume, scene: &Scene, x: u32, y: u32) -> [f64; 4] {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use brickfield::frame::{BrickSet, Decode, Feature, FramePlan, IndexEntry, Mode, Sampling};
+use brickfield::frame::{BrickSet, Decode, Feature, FramePlan, IndexEntry, Mode, SampleFormat, Sampling};
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, Knot, Level, TransferFunction};
 use brickfield_optics::QuadratureRule;
@@ -54,7 +54,7 @@ pub enum PlanMutant {
     DecodeScale,
     /// The volume ends a sample early.
     LastSampleCut,
-    /// The inner knots of the transfer function are moved, the lowest by 5 % of its range.
+    /// The knots of the transfer function are moved up, the lowest by 5 % of its range, the last not at all.
     KnotMoved,
     /// Extinction is 2 % too high.
     ExtinctionScaled,
@@ -62,11 +62,17 @@ pub enum PlanMutant {
     RedBlueSwapped,
     /// Rays end at a transmittance of 1/4.
     EndsEarly,
+    /// What lies behind the eye is seen.
+    BehindTheEye,
+    /// The clip box is ignored.
+    ClipIgnored,
+    /// Transparent blocks show a brick of the greatest value.
+    GhostBricks,
 }
 
 impl PlanMutant {
     /// All plan mutants.
-    pub const ALL: [PlanMutant; 26] = [
+    pub const ALL: [PlanMutant; 29] = [
         PlanMutant::AnchorHalfVoxel,
         PlanMutant::PixelCorner,
         PlanMutant::RowsFlipped,
@@ -93,6 +99,9 @@ impl PlanMutant {
         PlanMutant::ExtinctionScaled,
         PlanMutant::RedBlueSwapped,
         PlanMutant::EndsEarly,
+        PlanMutant::BehindTheEye,
+        PlanMutant::ClipIgnored,
+        PlanMutant::GhostBricks,
     ];
 
     /// The mutant's name in reports.
@@ -124,6 +133,9 @@ impl PlanMutant {
             PlanMutant::ExtinctionScaled => "plan/extinction-scaled",
             PlanMutant::RedBlueSwapped => "plan/red-blue-swapped",
             PlanMutant::EndsEarly => "plan/ends-early",
+            PlanMutant::BehindTheEye => "plan/behind-the-eye",
+            PlanMutant::ClipIgnored => "plan/clip-ignored",
+            PlanMutant::GhostBricks => "plan/ghost-bricks",
         }
     }
 
@@ -162,6 +174,12 @@ impl PlanMutant {
                 resample(&mut plan, |s| (s.step_world(), s.rule(), Mode::Fast { transmittance_floor: 0.25 }));
                 plan.features = plan.features.with(Feature::EarlyTermination);
             }
+            PlanMutant::BehindTheEye => see_behind(&mut plan),
+            PlanMutant::ClipIgnored => {
+                plan.domain = whole(&plan);
+                plan.visible = plan.domain;
+            }
+            PlanMutant::GhostBricks => show_ghosts(&mut plan),
         }
         plan
     }
@@ -182,6 +200,33 @@ fn make_parallel(plan: &mut FramePlan) {
     plan.rays.direction[1] = DVec3::ZERO;
     plan.rays.direction[2] = DVec3::ZERO;
     plan.rays.pixel = 0.0;
+}
+
+/// Lets rays begin a volume's length before the eye.
+fn see_behind(plan: &mut FramePlan) {
+    let step = plan.sampling.step_world();
+    let length = plan.dims.as_dvec3().length() / plan.rays.direction[0].length();
+    let back = (2.0 * length / step).ceil() * step;
+    plan.rays.start += back;
+}
+
+fn whole(plan: &FramePlan) -> Aabb {
+    Aabb { min: DVec3::splat(-0.5), max: plan.dims.as_dvec3() - 0.5 }
+}
+
+/// One brick whose samples all have the greatest stored value, everywhere.
+fn show_ghosts(plan: &mut FramePlan) {
+    let bricks = &plan.bricks;
+    let sample: &[u8] = match bricks.format() {
+        SampleFormat::Unorm8 | SampleFormat::Unorm16 => &[0xff],
+        SampleFormat::Float32 => &[0, 0, 0x80, 0x3f],
+    };
+    let bytes = sample.iter().copied().cycle().take(bricks.brick_bytes()).collect();
+    let ghost = BrickSet::new(bricks.side(), bricks.format(), bricks.decode(), bytes).expect("one brick");
+    plan.bricks = Arc::new(ghost);
+    let entry = IndexEntry::Resident { slot: 0, level: Level(0) };
+    plan.index.words_mut().fill(entry.pack());
+    plan.visible = plan.domain;
 }
 
 fn resample(plan: &mut FramePlan, change: impl Fn(&Sampling) -> (f64, QuadratureRule, Mode)) {
@@ -299,14 +344,11 @@ fn edit_knots(plan: &mut FramePlan, edit: impl FnMut(&mut Knot)) {
     plan.transfer = TransferFunction::new(knots).expect("a mutant's transfer function is one");
 }
 
-/// Moves all knots but the outer ones up, the lower ones by more; jumps stay jumps, and the order stays.
+/// Moves all knots but the last up, the lower ones by more; jumps stay jumps, and the order stays.
 fn move_knot(plan: &mut FramePlan) {
-    let range = transfer_range(plan);
     let knots = plan.transfer.knots();
-    let (first, last) = (knots[0].value, knots[knots.len() - 1].value);
+    let last = knots[knots.len() - 1].value;
     edit_knots(plan, |k| {
-        if first < k.value && k.value < last {
-            k.value += 0.05 * range * (last - k.value) / range;
-        }
+        k.value += 0.05 * (last - k.value);
     });
 }

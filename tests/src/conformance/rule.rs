@@ -38,8 +38,10 @@ pub struct Tolerance {
 pub struct Verdict {
     /// The errors, where the picture could be compared at all.
     pub errors: Option<Errors>,
-    /// The pixel that is farthest beyond (or nearest to) its bound, and that bound.
+    /// The pixel that exceeds its bound by the greatest factor (or comes nearest to it), and its bound.
     pub closest: Option<(UVec2, f64)>,
+    /// The greatest difference in units of its pixel's bound.
+    pub used: f64,
     /// Why the picture fails.
     pub complaint: Option<Complaint>,
 }
@@ -60,6 +62,8 @@ pub enum Complaint {
     NoRule { n_samples: u64 },
     #[error("a quarter of the pixels may differ by more than {bound:.2}: the tolerance promises nothing")]
     EmptyPromise { bound: f64 },
+    #[error("the picture shows {found}, but the case says {stated}")]
+    Blank { found: &'static str, stated: &'static str },
     #[error("the reference differs from the volume's own sum by {difference:.3e} at pixel ({}, {}): the plan is wrong", pixel.x, pixel.y)]
     Oracle { pixel: UVec2, difference: f64 },
 }
@@ -94,14 +98,14 @@ impl Tolerance {
     pub fn judge(&self, image: &Image<f32>, reference: &Image<f64>) -> Verdict {
         let errors = match errors(image, reference) {
             Ok(errors) => errors,
-            Err(e) => return Verdict { errors: None, closest: None, complaint: Some(e.into()) },
+            Err(e) => return Verdict { errors: None, closest: None, used: f64::INFINITY, complaint: Some(e.into()) },
         };
         let by_pixel = differences(image, reference);
-        let excess = |i: &usize| by_pixel[*i] - self.most[*i];
-        let i = (0..by_pixel.len()).max_by(|a, b| excess(a).total_cmp(&excess(b))).unwrap_or(0);
+        let share = |i: &usize| by_pixel[*i] / self.most[*i];
+        let i = (0..by_pixel.len()).max_by(|a, b| share(a).total_cmp(&share(b))).unwrap_or(0);
         let closest = (pixel(image.size(), i), self.most[i]);
         let complaint = self.beyond(i, &by_pixel, closest.0).or_else(|| self.bulk_beyond(&by_pixel));
-        Verdict { errors: Some(errors), closest: Some(closest), complaint }
+        Verdict { errors: Some(errors), closest: Some(closest), used: share(&i), complaint }
     }
 
     fn beyond(&self, i: usize, by_pixel: &[f64], pixel: UVec2) -> Option<Complaint> {

@@ -129,8 +129,11 @@ fn told(
 fn of_verdict(case: &Case, backend: &str, verdict: &Verdict) -> Outcome {
     let numbers = verdict.errors.as_ref().map(|e| {
         let Errors { max, p, x, y } = Errors::of(e);
-        let bound = verdict.closest.map_or(0.0, |c| c.1);
-        format!("max {max:.2e} at ({x}, {y}), 99.9 % within {p:.2e}, closest bound {bound:.2e}")
+        let (at, bound) = verdict.closest.unwrap_or_default();
+        format!(
+            "max {max:.2e} at ({x}, {y}), 99.9 % within {p:.2e}, at most {:.2} of its bound ({bound:.2e} at ({}, {}))",
+            verdict.used, at.x, at.y
+        )
     });
     let numbers = numbers.unwrap_or_default();
     let (status, note) = match &verdict.complaint {

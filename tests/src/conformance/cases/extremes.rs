@@ -31,7 +31,9 @@ fn depths() -> Vec<Case> {
             // 2,000 steps of tau h = 5e-8: their sum is visible, each of them is below the digits of 1 - e^-x.
             thin(2.5e-6)().step(0.02).with(|s| s.size = UVec2::splat(24))
         }),
-        picture("extreme/tau-1e12", catches![RowsFlipped], move || scaled(1e12, QuadratureRule::MidpointExponential)()),
+        picture("extreme/tau-1e12", catches![KnotMoved, AnchorHalfVoxel, RowsFlipped], move || {
+            scaled(1e12, QuadratureRule::MidpointExponential)()
+        }),
         picture("extreme/alpha-1", catches![DomainAtSamples, RedBlueSwapped], || {
             let depth = brickfield_optics::depth(1.0);
             Setup::new(constant(&grid(), ScalarType::U8, 0.4), transfer(2.0 * depth))
@@ -107,7 +109,7 @@ fn shapes() -> Vec<Case> {
     };
     let cube = [1.0; 3];
     vec![
-        picture("extreme/1x1x50", catches![ExtinctionScaled, IndexSwapped], move || {
+        picture("extreme/1x1x50", catches![LastSampleCut, ExtinctionScaled, IndexSwapped], move || {
             of([1, 1, 50], [9.0, 9.0, 1.0])().step(0.7)
         }),
         picture(
@@ -128,15 +130,20 @@ fn shapes() -> Vec<Case> {
         }),
         picture("extreme/brick-and-one", catches![BricksShifted, LastSampleCut], of([17, 16, 31], cube)),
         picture("extreme/spacing-1-to-1000", catches![AnchorHalfVoxel, ExtinctionScaled], || {
-            // 1,000 samples through a voxel that is long, one through a thousand that are short.
-            let grid = Grid::axis_aligned(UVec3::new(33, 33, 3), DVec3::new(1.0, 1.0, 1000.0)).expect("a grid");
-            let knots = [knot(0.0, 0.0, WARM), knot(1.0, 0.002, COOL)];
-            let transfer = spread(&knots, ScalarType::U16).expect("knots ascend");
-            // From near its middle: seen whole it is thinner than a pixel.
-            let (eye, target) = (DVec3::new(90.0, -60.0, 1350.0), DVec3::new(16.5, 16.5, 1500.0));
-            Setup::new(hills(&grid, ScalarType::U16), transfer).step(2.0).eye(eye, target)
+            // Down the long voxels: a thousand samples in each.
+            long_voxels().parallel(DVec3::new(0.004, 0.007, -1.0), 44.0).step(2.0)
+        }),
+        picture("extreme/spacing-1-to-1000-across", catches![BricksTransposed, PixelCorner], || {
+            long_voxels().eye(DVec3::new(-12.0, -9.0, 1400.0), DVec3::new(16.0, 16.0, 1500.0))
         }),
     ]
+}
+
+fn long_voxels() -> Setup {
+    let grid = Grid::axis_aligned(UVec3::new(33, 29, 3), DVec3::new(1.0, 1.0, 1000.0)).expect("a grid");
+    let knots = [knot(0.0, 0.0, WARM), knot(1.0, 0.01, COOL)];
+    let transfer = spread(&knots, ScalarType::U16).expect("knots ascend");
+    Setup::new(hills(&grid, ScalarType::U16), transfer)
 }
 
 /// Far from the world's origin, far from the volume, and in the middle of a voxel.
@@ -162,10 +169,14 @@ fn places() -> Vec<Case> {
                 s.camera = camera.expect("a camera");
             })
         }),
-        picture("extreme/eye-in-a-voxel", catches![AnchorHalfVoxel, BricksShifted], || {
-            let setup = Setup::new(hills(&grid(), ScalarType::U16), soft(ScalarType::U16)).step(0.05);
-            let eye = DVec3::new(20.31, 17.77, 16.12);
-            setup.eye(eye, eye + DVec3::new(0.2, 0.3, -0.1)).with(|s| s.size = UVec2::splat(32))
-        }),
+        picture(
+            "extreme/eye-in-a-voxel",
+            catches![AnchorHalfVoxel, BricksShifted, BehindTheEye, shader::LAST_NOT_CUT],
+            || {
+                let setup = Setup::new(hills(&grid(), ScalarType::U16), soft(ScalarType::U16)).step(0.05);
+                let eye = DVec3::new(20.31, 17.77, 16.12);
+                setup.eye(eye, eye + DVec3::new(0.2, 0.3, -0.1)).with(|s| s.size = UVec2::splat(32))
+            },
+        ),
     ]
 }

@@ -4,10 +4,10 @@ use brickfield::bricks::Downsampling;
 use brickfield::frame::Mode;
 use brickfield::lod::Criterion;
 use brickfield_core::ScalarType;
-use brickfield_core::glam::DVec3;
+use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_optics::QuadratureRule;
 
-use super::fields::{COOL, WARM, grid, hills, knot, shell, soft, sparse};
+use super::fields::{COOL, WARM, checkers, grid, hills, knot, shell, soft};
 use super::setup::{Setup, catches, picture};
 use crate::conformance::case::Case;
 use crate::conformance::plan_mutants::PlanMutant::*;
@@ -39,8 +39,8 @@ pub(super) fn cases() -> Vec<Case> {
             fast(hills_of(ScalarType::U16).detail(Criterion::Distance { factor: 1.0 }, Downsampling::Average))
                 .eye(near, DVec3::new(20.0, 18.0, 16.0))
         }),
-        picture("fast/sparse", catches![VisibleTooSmall, shader::JUMPS_TOO_FAR], move || {
-            fast(Setup::new(sparse(&grid(), ScalarType::U16), soft(ScalarType::U16)))
+        picture("fast/skip", catches![VisibleTooSmall, shader::JUMPS_TOO_FAR], move || {
+            fast(Setup::new(checkers(UVec3::new(71, 66, 53)), soft(ScalarType::U8)))
         }),
         picture("fast/gauss2", catches![IndexSwapped, RowsFlipped, shader::HALF_TEXEL], move || {
             fast(hills_of(ScalarType::U16).rule(QuadratureRule::Gauss2))

@@ -90,6 +90,19 @@ pub(super) fn sparse(grid: &Grid, scalar: ScalarType) -> Volume {
     fill_unit(grid, scalar, |p| near.at(p) + far.at(p))
 }
 
+/// Bricks of 16 that are full up to their borders beside empty ones: what a jump over an empty one misses shows at once.
+pub(super) fn checkers(dims: UVec3) -> Volume {
+    let grid = Grid::axis_aligned(dims, DVec3::ONE).expect("a grid");
+    fill_unit(&grid, ScalarType::U8, |p| {
+        let i = p.floor().as_uvec3();
+        let border = (i % 15).cmpeq(UVec3::ZERO).any();
+        let brick = i / 15;
+        let full = (brick.x + brick.y + brick.z) % 2 == 1 && brick.x != 2;
+        let grain = f64::from((i.x * 7 + i.y * 13 + i.z * 29) % 16) / 15.0;
+        if border || !full { 0.0 } else { 0.5 + 0.5 * grain }
+    })
+}
+
 pub(super) fn marschner_lobb(n: u32, scalar: ScalarType) -> Volume {
     let grid = Grid::axis_aligned(UVec3::splat(n), DVec3::ONE).expect("a grid");
     let field = Field::MarschnerLobb { center: grid.world_box().center(), half_side: 0.5 * f64::from(n) };

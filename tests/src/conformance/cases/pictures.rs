@@ -70,6 +70,7 @@ fn fields() -> Vec<Case> {
                 IndexSwapped,
                 LastSampleCut,
                 shader::INDEX_STRIDE,
+                shader::ATLAS_ROW,
                 shader::OVERSTAYS,
                 shader::NO_ATTENUATION
             ],

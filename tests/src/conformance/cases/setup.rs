@@ -7,7 +7,7 @@ use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Aabb, BrickSide, Camera, Projection, ScalarType, TransferFunction, Volume};
 use brickfield_optics::QuadratureRule;
 
-use super::super::case::{Case, Check, Mutant, NoData, Oracle, Subject};
+use super::super::case::{Case, Check, Mutant, NoData, Oracle, Shows, Subject};
 
 /// A scene in the making.
 pub(super) struct Setup {
@@ -15,6 +15,7 @@ pub(super) struct Setup {
     side: BrickSide,
     downsampling: Downsampling,
     oracle: OracleKind,
+    shows: Shows,
     scene: Scene,
 }
 
@@ -38,6 +39,7 @@ impl Setup {
             side: BrickSide::S16,
             downsampling: Downsampling::Average,
             oracle: OracleKind::Volume,
+            shows: Shows::Something,
             scene: Scene::new(camera, PICTURE, transfer),
             volume,
         }
@@ -47,6 +49,11 @@ impl Setup {
     pub(super) fn with(mut self, change: impl FnOnce(&mut Scene)) -> Setup {
         change(&mut self.scene);
         self
+    }
+
+    /// There is nothing to see.
+    pub(super) fn blank(self) -> Setup {
+        Setup { shows: Shows::Nothing, ..self }
     }
 
     pub(super) fn rule(self, rule: QuadratureRule) -> Setup {
@@ -111,7 +118,7 @@ impl Setup {
             OracleKind::EveryLevel => Oracle::EveryLevel(volume),
             OracleKind::None => Oracle::None,
         };
-        Subject { tree, scene: self.scene, oracle }
+        Subject { tree, scene: self.scene, oracle, shows: self.shows }
     }
 }
 

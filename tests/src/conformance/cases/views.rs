@@ -1,5 +1,6 @@
 //! Where the eye can be, and how rays can run.
 
+use brickfield::Skipping;
 use brickfield_core::ScalarType;
 use brickfield_core::glam::{DVec3, UVec2};
 
@@ -25,7 +26,12 @@ fn eyes() -> Vec<Case> {
     vec![
         case("eye/outside", catches![NotNormalised, Parallel, shader::NOT_NORMALISED], [61.0, -40.0, 33.0], far),
         case("eye/far", catches![AnchorHalfVoxel, StepScaled, shader::PIXEL_CORNER], [30.0, -90.0, 12.0], far),
-        case("eye/inside", catches![AnchorHalfVoxel, PixelCorner], [17.3, 12.1, 20.9], [40.0, 30.0, 5.0]),
+        case(
+            "eye/inside",
+            catches![AnchorHalfVoxel, PixelCorner, BehindTheEye, shader::LAST_NOT_CUT],
+            [17.3, 12.1, 20.9],
+            [40.0, 30.0, 5.0],
+        ),
         case(
             "eye/in-a-voxel-centre",
             catches![AnchorHalfVoxel, shader::NEAREST],
@@ -42,6 +48,11 @@ fn eyes() -> Vec<Case> {
         // No ray within ten degrees of a face: where a ray enters along one, f32 knows only to rounding / slope.
         picture("eye/on-a-corner", catches![BricksShifted, shader::LAST_NOT_CUT], move || {
             subject().lens(DVec3::ZERO, DVec3::from(far), 0.5)
+        }),
+        picture("eye/looks-away", catches![BehindTheEye], || {
+            let eye = DVec3::new(20.0, -12.0, 13.5);
+            let away = subject().eye(eye, eye - DVec3::Y).blank();
+            away.with(|s| s.skipping = Skipping::Off)
         }),
         case("eye/just-outside", catches![LastSegmentDropped, shader::LAST_DROPPED], [20.0, -1e-3, 16.0], far),
     ]
@@ -85,8 +96,11 @@ fn axes() -> Vec<Case> {
 
 fn clips() -> Vec<Case> {
     vec![
-        picture("clip/box", catches![DomainAtSamples, LastSegmentDropped, shader::LAST_NOT_CUT], || {
+        picture("clip/box", catches![ClipIgnored, LastSegmentDropped, shader::LAST_NOT_CUT], || {
             subject().clip([-5.0, 4.3, 2.0], [21.7, 99.0, 30.5])
+        }),
+        picture("clip/outside", catches![ClipIgnored], || {
+            subject().clip([50.0, 0.0, 0.0], [60.0, 9.0, 9.0]).with(|s| s.skipping = Skipping::Off).blank()
         }),
         picture("clip/thin", catches![AnchorHalfVoxel, ExtinctionScaled, shader::LAST_NOT_CUT], || {
             subject().clip([10.0, 0.0, 0.0], [10.2, 36.0, 33.0])
