@@ -55,7 +55,8 @@ fn print(rows: &[Row]) -> bool {
         let (slope, n) = row.observed().map_or(("-".into(), 0), |o| (format!("{:.3}", o.slope), o.n_halvings));
         let errors: Vec<String> = row.errors.iter().map(|(_, e)| format!("{e:.1e}")).collect();
         let verdict = if row.holds() { "" } else { "  NOT WITHIN 0.1" };
-        println!("{:<44} {:>7} {slope:>9} {n:>9}  {}{verdict}", row.what, row.order, errors.join(" "));
+        let claimed = if row.claims_floor() { format!("< {:.0e}", row.floor) } else { row.order.to_string() };
+        println!("{:<44} {claimed:>7} {slope:>9} {n:>9}  {}{verdict}", row.what, errors.join(" "));
     }
     rows.iter().all(Row::holds)
 }

@@ -11,7 +11,8 @@ pub struct Row {
     pub errors: Vec<(f64, f64)>,
     /// Errors below this are rounding, and left out.
     pub floor: f64,
-    /// Least number of halvings that must be left.
+    /// Least number of halvings that must be left; 0 where rounding leaves no order to see: then the finest error must be
+    /// below the floor.
     pub n_halvings: usize,
 }
 
@@ -29,11 +30,19 @@ impl Row {
     pub fn observed(&self) -> Option<Observed> {
         let above: Vec<(f64, f64)> = self.errors.iter().copied().take_while(|(_, e)| *e > self.floor).collect();
         let n_halvings = above.len().saturating_sub(1);
-        (n_halvings >= self.n_halvings).then(|| Observed { slope: fit(&above), n_halvings })
+        (n_halvings >= self.n_halvings.max(1)).then(|| Observed { slope: fit(&above), n_halvings })
+    }
+
+    /// Whether only the floor is claimed, not an order.
+    pub fn claims_floor(&self) -> bool {
+        self.n_halvings == 0
     }
 
     /// Whether the claim holds.
     pub fn holds(&self) -> bool {
+        if self.claims_floor() {
+            return self.errors.last().is_some_and(|(_, e)| *e <= self.floor);
+        }
         self.observed().is_some_and(|o| (o.slope - self.order).abs() <= super::WITHIN)
     }
 }
@@ -69,5 +78,7 @@ mod tests {
         assert!(!row(|_| 0.0).holds());
         assert!(!row(|h| f64::NAN * h).holds());
         assert!(!Row { floor: 0.1, ..row(|h| h.powi(2)) }.holds());
+        let floor = |e: f64| Row { floor: 1e-6, n_halvings: 0, ..row(|_| e) };
+        assert!(floor(1e-7).holds() && !floor(1e-5).holds() && !floor(f64::NAN).holds());
     }
 }
