@@ -62,6 +62,7 @@ fn steps() -> Result<Vec<Step>> {
         step("build", || cargo("build").args(["--workspace", "--all-targets"]).run()),
     ];
     steps.extend(readme_steps()?);
+    steps.push(step("orders of accuracy", || xtask(&["orders"]).run()));
     steps.push(step("conformance", || xtask(&["conformance", "--require", "cpu,wgpu,ash"]).run()));
     steps.push(step("conformance of the cases", || xtask(&["conformance", "--self-check"]).run()));
     Ok(steps)
