@@ -174,3 +174,62 @@ fn longest_ray(plan: &FramePlan) -> u64 {
     let most = (0..size.x * size.y).map(samples).fold(0.0, f64::max);
     most.ceil() as u64 * plan.sampling.rule().nodes().len() as u64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: UVec2 = UVec2::new(50, 40);
+
+    fn tolerance(ambiguous: Option<usize>) -> Tolerance {
+        let of = |bound: f64| (0..2000).map(|i| bound + if Some(i) == ambiguous { 0.1 } else { 0.0 }).collect();
+        Tolerance { most: of(1e-4), bulk: of(BULK_BOUND) }
+    }
+
+    fn image(by: f64, n_pixels: usize) -> (Image<f32>, Image<f64>) {
+        let reference = Image::new(SIZE, vec![[0.1, 0.2, 0.3, 0.5]; 2000]).unwrap();
+        let mut image = reference.map(|v| v as f32);
+        image.pixels_mut()[..n_pixels].iter_mut().for_each(|p| p[3] += by as f32);
+        (image, reference)
+    }
+
+    fn complaint(tolerance: &Tolerance, by: f64, n_pixels: usize) -> Option<Complaint> {
+        let (image, reference) = image(by, n_pixels);
+        tolerance.judge(&image, &reference).complaint
+    }
+
+    #[test]
+    fn one_pixel_beyond_the_wide_bound_fails_and_two_in_2000_beyond_the_narrow_one_pass() {
+        assert_eq!(complaint(&tolerance(None), 0.0, 0), None);
+        assert!(matches!(complaint(&tolerance(None), 2e-4, 1), Some(Complaint::Worst { .. })));
+        assert_eq!(complaint(&tolerance(None), 5e-5, 2), None);
+        assert!(matches!(
+            complaint(&tolerance(None), 5e-5, 3),
+            Some(Complaint::Bulk { n_beyond: 3, n_allowed: 2, .. })
+        ));
+    }
+
+    #[test]
+    fn ambiguity_widens_its_own_pixel_only() {
+        assert_eq!(complaint(&tolerance(Some(0)), 0.05, 1), None);
+        assert!(complaint(&tolerance(Some(0)), 0.05, 2).is_some());
+        assert!(complaint(&tolerance(Some(7)), 0.05, 1).is_some());
+    }
+
+    #[test]
+    fn what_is_not_a_picture_fails() {
+        assert!(matches!(complaint(&tolerance(None), f64::NAN, 1), Some(Complaint::NotComparable(_))));
+        let transfer = TransferFunction::constant(1.0, [0.9, 0.3, 0.1]).unwrap();
+        let pixel = |p: [f32; 4]| bounded(&Image::new(UVec2::ONE, vec![p]).unwrap(), &transfer).is_none();
+        assert!(pixel([0.0; 4]) && pixel([0.45, 0.15, 0.05, 0.5]));
+        assert!(!pixel([0.5, 0.0, 0.0, 0.5]) && !pixel([0.0, 0.0, 0.0, 1.1]) && !pixel([-0.1, 0.0, 0.0, 0.5]));
+    }
+
+    #[test]
+    fn a_tolerance_that_allows_anything_promises_nothing() {
+        let wide =
+            |n: usize| Tolerance { most: (0..100).map(|i| if i < n { 0.5 } else { 1e-4 }).collect(), bulk: vec![] };
+        assert!(wide(20).is_empty_promise().is_none());
+        assert!(wide(30).is_empty_promise().is_some());
+    }
+}
