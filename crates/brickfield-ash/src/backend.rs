@@ -5,10 +5,10 @@ use std::time::Instant;
 
 use brickfield_core::Image as Picture;
 use brickfield_frame::{Backend, Capabilities, Description, Frame, FramePlan, RenderError, ShaderFunction, Timing};
-use brickfield_shaders::{Entry, ShaderLibrary, Variant};
+use brickfield_shaders::{Entry, ShaderLibrary, Variant, passes, pixels_per_pass};
 
 use crate::evaluate::Lists;
-use crate::march::{groups_per_submit, march, milliseconds_since, read_back, reserve_picture};
+use crate::march::{march, milliseconds_since, read_back, reserve_picture};
 use crate::options::choose;
 use crate::scene::Scene;
 use crate::staging::Staging;
@@ -72,16 +72,20 @@ impl AshBackend {
     fn replay(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
         let started = Instant::now();
         let pipeline = self.variants.pipeline(&self.device, Variant::of(plan, Entry::March))?;
-        self.scene.upload(&mut self.queue, &mut self.staging, plan, pipeline)?;
+        let uniforms = self.scene.upload(&mut self.queue, &mut self.staging, plan, pipeline)?;
         let picture = reserve_picture(&mut self.picture, &self.device, plan.size())?;
-        let groups_per_submit = groups_per_submit(plan, pipeline.workgroup_size()[1]);
+        let group_height = pipeline.workgroup_size()[1];
+        if pipeline.binds(8) {
+            self.scene.reserve_rays(pixels_per_pass(plan, group_height))?;
+        }
         let scene = &self.scene;
         let bound = pipeline.bind(|binding| match binding {
             5 => Some(Resource::Picture(picture)),
             _ => scene.resource(binding),
         })?;
         let upload_ms = milliseconds_since(started);
-        let time = march(&mut self.queue, &bound, picture, groups_per_submit)?;
+        let target = scene.uniforms().expect("the upload filled it");
+        let time = march(&mut self.queue, &bound, picture, (target, uniforms), &passes(plan, group_height))?;
         let marched = Instant::now();
         let image = read_back(&mut self.queue, &mut self.staging, picture)?;
         let read_back_ms = milliseconds_since(marched);

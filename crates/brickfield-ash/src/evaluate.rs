@@ -60,7 +60,7 @@ impl AshBackend {
             _ => scene.resource(binding),
         })?;
         let groups = bound.workgroups([inputs.len() as u32, 1, 1]);
-        self.queue.run("evaluating a function", |recorder| recorder.dispatch(&bound, [0; 3], groups))?;
+        self.queue.run("evaluating a function", |recorder| recorder.dispatch(&bound, groups))?;
         let bytes = self.staging.read(&mut self.queue, results, n_bytes)?;
         let n = outputs.len();
         outputs.resize(n + inputs.len(), [0.0; 4]);

@@ -1,20 +1,17 @@
-//! A frame: rows of pixels, submit by submit, and the picture's way back.
+//! A frame: pass by pass, and the picture's way back.
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use brickfield_core::Image as Picture;
 use brickfield_core::glam::{UVec2, UVec3};
-use brickfield_frame::{FramePlan, RenderError};
+use brickfield_frame::{FrameUniforms, Pass, RenderError};
 
 use crate::staging::{CHUNK_BYTES, Staging};
-use crate::vulkan::{BoundPipeline, Device, Image, ImageBox, Queue, Use};
+use crate::vulkan::{BoundPipeline, Buffer, Device, Image, ImageBox, Queue, Use};
 
-/// Most nodes that one submit may evaluate: about a second on a slow device, whose driver may end what takes longer.
-const NODES_PER_SUBMIT: f64 = (1u32 << 28) as f64;
-
-/// Bytes of a pixel.
-const PIXEL_BYTES: usize = size_of::<[f32; 4]>();
+/// Bytes of a pixel, and of what a ray has seen.
+pub(crate) const PIXEL_BYTES: usize = size_of::<[f32; 4]>();
 
 /// How long the march took, in milliseconds.
 pub(crate) struct MarchTime {
@@ -35,33 +32,28 @@ pub(crate) fn reserve_picture<'a>(
     }
 }
 
-/// Rows of workgroups to submit at once.
-pub(crate) fn groups_per_submit(plan: &FramePlan, group_height: u32) -> u32 {
-    let voxels_per_segment = plan.rays.direction[0].length() * plan.sampling.step_world();
-    let segments_per_ray = (plan.visible.diagonal() / voxels_per_segment).max(1.0);
-    let nodes_per_row = segments_per_ray * plan.sampling.rule().nodes().len() as f64 * f64::from(plan.size().x);
-    // a float that is too large, or not a number, becomes the largest or 0
-    ((NODES_PER_SUBMIT / nodes_per_row) as u32 / group_height).max(1)
-}
-
-/// Renders into `picture`, `groups_per_submit` rows of workgroups at once.
+/// Renders into `picture`, pass by pass; each has its own uniforms in their buffer.
 pub(crate) fn march(
     queue: &mut Queue,
     bound: &BoundPipeline<'_>,
     picture: &Image,
-    groups_per_submit: u32,
+    (buffer, uniforms): (&Buffer, FrameUniforms),
+    passes: &[Pass],
 ) -> Result<MarchTime, RenderError> {
     let started = Instant::now();
-    let [n_x, n_y, _] = bound.workgroups(picture.extent().to_array());
     let mut device_ms = Some(0.0);
     let mut before = Use::Nothing;
-    for first in (0..n_y).step_by(groups_per_submit as usize) {
-        let n_rows = groups_per_submit.min(n_y - first);
-        let band_ms = queue.run_timed("rendering", |recorder| {
+    for pass in passes {
+        let groups = bound.workgroups([picture.extent().x, pass.rows.len() as u32, 1]);
+        let pass_ms = queue.run_timed("rendering", |recorder| {
+            recorder.update(buffer, bytemuck::bytes_of(&uniforms.in_pass(pass)));
+            recorder.barrier(Use::CopyTarget, Use::ShaderRead);
+            // What the pass before left of its rays.
+            recorder.barrier(Use::ShaderWrite, Use::ShaderWrite);
             recorder.image_barrier(picture, before, Use::ShaderWrite);
-            recorder.dispatch(bound, [0, first, 0], [n_x, n_rows, 1]);
+            recorder.dispatch(bound, groups);
         })?;
-        device_ms = device_ms.zip(band_ms).map(|(sum, ms)| sum + ms);
+        device_ms = device_ms.zip(pass_ms).map(|(sum, ms)| sum + ms);
         before = Use::ShaderWrite;
     }
     Ok(MarchTime { device_ms, wall_ms: milliseconds_since(started) })

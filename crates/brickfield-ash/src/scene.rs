@@ -9,6 +9,7 @@ use brickfield_shaders::BindingKind;
 
 use crate::atlas::{Atlas, atlas_shape, check_format};
 use crate::error::FailedCall;
+use crate::march::PIXEL_BYTES;
 use crate::staging::Staging;
 use crate::vulkan::{Buffer, Device, Pipeline, Queue, Resource, Sampler};
 
@@ -20,6 +21,7 @@ pub(crate) struct Scene {
     uniforms: Slot,
     index: Slot,
     knots: Slot,
+    seen_before: Slot,
 }
 
 /// A buffer that grows when it must, and how much of it is used.
@@ -40,17 +42,18 @@ impl Scene {
             uniforms: Slot::new("the uniform block", vk::BufferUsageFlags::UNIFORM_BUFFER),
             index: Slot::new("the brick index", vk::BufferUsageFlags::STORAGE_BUFFER),
             knots: Slot::new("the transfer function", vk::BufferUsageFlags::STORAGE_BUFFER),
+            seen_before: Slot::new("rays between passes", vk::BufferUsageFlags::STORAGE_BUFFER),
         })
     }
 
-    /// Brings to the device what `pipeline` needs of `plan`, and is not there.
+    /// Brings to the device what `pipeline` needs of `plan`, and is not there; returns the uniforms, as for a single pass.
     pub(crate) fn upload(
         &mut self,
         queue: &mut Queue,
         staging: &mut Staging,
         plan: &FramePlan,
         pipeline: &Pipeline,
-    ) -> Result<(), RenderError> {
+    ) -> Result<FrameUniforms, RenderError> {
         let shape = match pipeline.needs(BindingKind::Texture3d) {
             true => self.upload_bricks(queue, staging, plan, pipeline)?,
             false => AtlasShape { bricks: UVec3::ONE, side: plan.bricks.side() },
@@ -63,7 +66,18 @@ impl Scene {
         for (slot, bytes) in slots.into_iter().zip(contents) {
             copies.push((slot.reserve(&self.device, bytes.len())?, bytes));
         }
-        staging.fill(queue, &copies)
+        staging.fill(queue, &copies)?;
+        Ok(uniforms)
+    }
+
+    /// Makes room for what `n_pixels` rays saw in one pass, and the next must know.
+    pub(crate) fn reserve_rays(&mut self, n_pixels: u64) -> Result<(), RenderError> {
+        self.seen_before.reserve(&self.device, n_pixels as usize * PIXEL_BYTES).map(drop)
+    }
+
+    /// The buffer of the uniforms, once there was an upload.
+    pub(crate) fn uniforms(&self) -> Option<&Buffer> {
+        self.uniforms.buffer.as_ref()
     }
 
     /// What the shader's bindings of a plan's data stand for.
@@ -74,6 +88,7 @@ impl Scene {
             2 => Some(Resource::Sampler(&self.sampler)),
             3 => self.index.resource(),
             4 => self.knots.resource(),
+            8 => self.seen_before.resource(),
             _ => None,
         }
     }

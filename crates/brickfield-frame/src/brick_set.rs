@@ -129,6 +129,18 @@ impl BrickSet {
         self.decode
     }
 
+    /// The stored integer nearest to a data value; counted from it, f32 keeps the most digits of samples near the value.
+    /// 0 for floats.
+    pub fn nearest_stored(&self, value: f64) -> f64 {
+        let unit = self.format.unit();
+        match self.format {
+            SampleFormat::Unorm8 | SampleFormat::Unorm16 => {
+                ((value - self.decode.offset) / self.decode.scale * unit).round().clamp(0.0, unit)
+            }
+            SampleFormat::Float32 => 0.0,
+        }
+    }
+
     /// All bytes, brick after brick.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
@@ -230,5 +242,13 @@ mod tests {
         let (_, decode) = BrickSet::encoding(ScalarType::I16, range);
         assert_eq!(decode.value(0.0), -32768.0);
         assert_eq!(decode.value(1.0), 32767.0);
+    }
+
+    #[test]
+    fn the_nearest_stored_integer_stays_in_the_format() {
+        let (format, decode) = BrickSet::encoding(ScalarType::I16, ValueRange { min: 0.0, max: 0.0 });
+        let set = BrickSet::new(BrickSide::S16, format, decode, vec![]).unwrap();
+        let expected = [(0.0, 32768.0), (-1.4, 32767.0), (1e9, 65535.0), (-1e9, 0.0)];
+        assert!(expected.into_iter().all(|(value, stored)| set.nearest_stored(value) == stored));
     }
 }

@@ -6,7 +6,7 @@ use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, TransferFunction};
 use brickfield_optics::QuadratureRule;
 
-use crate::{BrickSet, FeatureSet, IndexGrid, RayFrame};
+use crate::{BrickSet, Feature, FeatureSet, IndexGrid, RayFrame, SampleFormat};
 
 /// Everything that a backend needs for one frame, and nothing that this frame does not need.
 #[derive(Clone, Debug)]
@@ -35,6 +35,12 @@ impl FramePlan {
     /// The last sample of the volume, in sample space: positions are clamped to [0, last].
     pub fn last_sample(&self) -> DVec3 {
         (self.dims - 1).as_dvec3()
+    }
+
+    /// Whether shaders turn what they read of a texture back into the integers that were stored: 16-bit samples where
+    /// no hardware filters them. Of a fraction in [0, 1], f32 has too few digits left for what lies between two of them.
+    pub fn reads_integers(&self) -> bool {
+        self.bricks.format() == SampleFormat::Unorm16 && !self.features.contains(Feature::HardwareFilter)
     }
 
     /// Width and height of the picture, in pixels.

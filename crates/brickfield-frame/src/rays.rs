@@ -27,6 +27,8 @@ pub struct RayFrame {
     pub anchor_depth: f64,
     /// Where the frame's parameter begins: this many world units from the eye, a whole number of steps.
     pub start: f64,
+    /// Segments from the start to the farthest point of the volume, rounded up.
+    pub n_segments: f64,
 }
 
 /// One ray of a [`RayFrame`].
@@ -64,6 +66,7 @@ impl RayFrame {
             anchor_past_start: depth - start,
             anchor_depth: 0.0,
             start,
+            n_segments: ((farthest(camera, grid, domain) - start) / step_world).ceil().max(1.0),
         };
         match camera.projection() {
             Projection::Orthographic { .. } => frame,
@@ -101,11 +104,24 @@ impl PlanRay {
     }
 }
 
+/// Distance to the farthest point of the domain's world box, as rays measure it.
+fn farthest(camera: &Camera, grid: &Grid, domain: &Aabb) -> f64 {
+    let distance = |v: DVec3| match camera.projection() {
+        Projection::Orthographic { .. } => v.dot(camera.forward()),
+        Projection::Perspective { .. } => v.length(),
+    };
+    from_eye(camera, grid, domain).map(distance).into_iter().fold(0.0, f64::max)
+}
+
+/// From the eye to the corners of the domain's world box.
+fn from_eye(camera: &Camera, grid: &Grid, domain: &Aabb) -> [DVec3; 8] {
+    domain.corners().map(|p| grid.world(IndexPos::from(SamplePos(p))).0 - camera.eye())
+}
+
 /// Number of whole steps between the eye and the nearest point of the domain's world box; at least 0.
 fn first_step(camera: &Camera, grid: &Grid, domain: &Aabb, step_world: f64) -> f64 {
-    let corner = |p: DVec3| grid.world(IndexPos::from(SamplePos(p))).0 - camera.eye();
-    let corners = domain.corners().map(corner);
-    let nearest_plane = corners.iter().map(|c| c.dot(camera.forward())).fold(f64::INFINITY, f64::min);
+    let nearest_plane =
+        from_eye(camera, grid, domain).iter().map(|c| c.dot(camera.forward())).fold(f64::INFINITY, f64::min);
     (nearest_plane / step_world).floor().max(0.0)
 }
 
@@ -119,6 +135,7 @@ mod tests {
         let domain = Aabb { min: DVec3::splat(-0.5), max: grid.dims().as_dvec3() - 0.5 };
         let frame = RayFrame::new(camera, grid, size, &domain, 0.5);
         assert_eq!((frame.start / 0.5).fract(), 0.0);
+        assert!(frame.n_segments >= 1.0 && frame.n_segments <= 4.0 * grid.world_box().diagonal());
         for (x, y) in [(0, 0), (39, 29), (17, 3)] {
             let (ray, world) = (frame.ray(x, y), camera.pixel_rays(size).pixel_ray(x, y));
             for t in [frame.start, frame.start + 3.0, frame.start + 40.0] {

@@ -6,7 +6,7 @@ use brickfield_core::Knot;
 use brickfield_core::glam::{DVec3, UVec3};
 use bytemuck::{Pod, Zeroable};
 
-use crate::{AtlasShape, FramePlan};
+use crate::{AtlasShape, FramePlan, Pass};
 
 /// The frame's uniform block; every member is 16 bytes. Positions are in sample space relative to `RayFrame::center`.
 #[repr(C)]
@@ -24,23 +24,24 @@ pub struct FrameUniforms {
     pub direction_right: [f32; 4],
     /// Change of the direction a pixel down; w: transmittance floor.
     pub direction_down: [f32; 4],
-    /// Lower corner of the domain; w: scale from a texture read to a data value relative to the first knot.
+    /// Lower corner of the domain; w: scale from a sample as it is read to a data value relative to the first knot.
     pub domain_min: [f32; 4],
     /// Upper corner of the domain; w: offset of the same.
     pub domain_max: [f32; 4],
     /// Lower corner of what is visible; w: cells along a brick's side.
     pub visible_min: [f32; 4],
-    /// Upper corner of what is visible; w: reserved.
+    /// Upper corner of what is visible; w: first segment of the pass.
     pub visible_max: [f32; 4],
-    /// Subtracted from positions to reach sample space's origin (minus the centre); w: reserved.
+    /// Sample space's origin, relative to the centre; w: end of the pass's segments.
     pub origin: [f32; 4],
-    /// The last sample, relative to the centre; w: reserved.
+    /// The last sample, relative to the centre; w: the stored integer from which samples are counted
+    /// ([`FramePlan::reads_integers`]).
     pub last_sample: [f32; 4],
     /// Cells of the index grid; w: number of knots.
     pub index_dims: [u32; 4],
     /// Bricks of the atlas along x, y, z; w: samples along a brick's side.
     pub atlas_bricks: [u32; 4],
-    /// Width and height of the picture; z, w: reserved.
+    /// Width and height of the picture; z: first row of the pass; w: reserved.
     pub size: [u32; 4],
 }
 
@@ -56,12 +57,12 @@ pub struct KnotUniform {
 }
 
 impl FrameUniforms {
-    /// The uniform block of a plan whose bricks lie in an atlas of `atlas`.
+    /// The uniform block of a plan whose bricks lie in an atlas of `atlas`, for a frame in one pass.
     pub fn of(plan: &FramePlan, atlas: AtlasShape) -> FrameUniforms {
         let rays = &plan.rays;
         let n_cells = f64::from(plan.bricks.side().n_cells());
-        let decode = plan.bricks.decode();
-        let value_origin = value_origin(plan);
+        let samples = SampleScale::of(plan);
+        let whole = Pass::whole_rays(0..rays.size.y);
         let relative = |p: DVec3| p - rays.center;
         FrameUniforms {
             anchor: float4(rays.anchor[0], rays.anchor_past_start),
@@ -70,16 +71,26 @@ impl FrameUniforms {
             direction: float4(rays.direction[0], 0.0 - rays.start),
             direction_right: float4(rays.direction[1], plan.sampling.step_world()),
             direction_down: float4(rays.direction[2], plan.sampling.transmittance_floor()),
-            domain_min: float4(relative(plan.domain.min), decode.scale),
-            domain_max: float4(relative(plan.domain.max), decode.offset - value_origin),
+            domain_min: float4(relative(plan.domain.min), samples.scale),
+            domain_max: float4(relative(plan.domain.max), samples.offset),
             visible_min: float4(relative(plan.visible.min), n_cells),
             visible_max: float4(relative(plan.visible.max), 0.0),
             origin: float4(-rays.center, 0.0),
-            last_sample: float4(relative(plan.last_sample()), 0.0),
+            last_sample: float4(relative(plan.last_sample()), samples.counted_from),
             index_dims: uint4(plan.index.dims(), plan.transfer.knots().len() as u32),
             atlas_bricks: uint4(atlas.bricks, plan.bricks.side().n_samples()),
             size: [rays.size.x, rays.size.y, 0, 0],
         }
+        .in_pass(&whole)
+    }
+
+    /// The uniform block for one pass.
+    #[must_use]
+    pub fn in_pass(mut self, pass: &Pass) -> FrameUniforms {
+        self.visible_max[3] = pass.segments.start;
+        self.origin[3] = pass.segments.end;
+        self.size[2] = pass.rows.start;
+        self
     }
 }
 
@@ -92,6 +103,26 @@ impl KnotUniform {
             _ => 0.0,
         };
         knots.iter().enumerate().map(|(i, k)| knot(k, value_origin(plan), reciprocal(i))).collect()
+    }
+}
+
+/// From samples as shaders read them to values relative to the first knot: (read - counted_from) * scale + offset.
+struct SampleScale {
+    counted_from: f64,
+    scale: f64,
+    offset: f64,
+}
+
+impl SampleScale {
+    fn of(plan: &FramePlan) -> SampleScale {
+        let decode = plan.bricks.decode();
+        let offset = decode.offset - value_origin(plan);
+        if !plan.reads_integers() {
+            return SampleScale { counted_from: 0.0, scale: decode.scale, offset };
+        }
+        let counted_from = plan.bricks.nearest_stored(value_origin(plan));
+        let scale = decode.scale / plan.bricks.format().unit();
+        SampleScale { counted_from, scale, offset: offset + counted_from * scale }
     }
 }
 

@@ -2,15 +2,15 @@
 
 mod evaluate;
 mod library;
+mod passes;
 mod reflect;
-mod rounds;
 mod specialise;
 mod variant;
 
 pub use evaluate::{shader_inputs, shader_outputs};
 pub use library::{PatchError, ShaderLibrary};
+pub use passes::{passes, pixels_per_pass};
 pub use reflect::{Binding, BindingKind};
-pub use rounds::{LLVMPIPE_LOOP_ROUNDS, loop_rounds};
 pub use specialise::{Counts, ShaderError, Specialised, specialise};
 pub use variant::{Entry, KnotSearch, Variant};
 

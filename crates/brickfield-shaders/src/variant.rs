@@ -2,6 +2,8 @@
 
 use brickfield_frame::{Feature, FeatureSet, FramePlan, QuadratureRule, ShaderFunction};
 
+use crate::passes::has_long_rays;
+
 /// One shader of the family: what is compiled in. A key for pipeline caches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
@@ -14,14 +16,17 @@ pub struct Variant {
     pub rule: QuadratureRule,
     /// How knots are searched.
     pub search: KnotSearch,
+    /// Rays are too long for one pass ([`crate::passes`]), and go on where earlier passes ended.
+    pub long_rays: bool,
+    /// Texture reads of 16-bit samples are turned back into integers, of which f32 keeps all digits.
+    pub integer_samples: bool,
     /// What is run.
     pub entry: Entry,
 }
 
 /// How the knots of a transfer function are searched.
 ///
-/// Unrolled: on lavapipe that is 1.3 to 1.4 times as fast as a loop over four knots, and that driver ends all loops of an invocation
-/// after 65,535 rounds in total.
+/// Unrolled: on lavapipe that is 1.3 to 1.4 times as fast as a loop over four knots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum KnotSearch {
     /// So many halvings, at most [`KnotSearch::MOST_HALVINGS`]; 0 where there is one knot.
@@ -38,6 +43,14 @@ impl KnotSearch {
     pub fn among(n_knots: usize) -> KnotSearch {
         let halvings = n_knots.max(1).next_power_of_two().trailing_zeros() as u8;
         if halvings <= KnotSearch::MOST_HALVINGS { KnotSearch::Unrolled(halvings) } else { KnotSearch::Loop }
+    }
+
+    /// The search that a plan needs.
+    pub fn of(plan: &FramePlan) -> KnotSearch {
+        match plan.features.contains(Feature::TransferLookup) {
+            true => KnotSearch::among(plan.transfer.knots().len()),
+            false => KnotSearch::Unrolled(0),
+        }
     }
 
     /// All searches.
@@ -79,11 +92,14 @@ impl Entry {
 impl Variant {
     /// The shader that replays `plan`.
     pub fn of(plan: &FramePlan, entry: Entry) -> Variant {
-        let search = match plan.features.contains(Feature::TransferLookup) {
-            true => KnotSearch::among(plan.transfer.knots().len()),
-            false => KnotSearch::Unrolled(0),
-        };
-        Variant { features: plan.features, rule: plan.sampling.rule(), search, entry }
+        Variant {
+            features: plan.features,
+            rule: plan.sampling.rule(),
+            search: KnotSearch::of(plan),
+            long_rays: entry == Entry::March && has_long_rays(plan),
+            integer_samples: plan.reads_integers(),
+            entry,
+        }
     }
 
     /// The conditions (`@if(name)`) that hold.
@@ -98,6 +114,8 @@ impl Variant {
             ("one_node", !two_nodes),
             ("two_nodes", two_nodes),
             ("bricks", has(Feature::TransferLookup) || has(Feature::SkipTransparent)),
+            ("long_rays", self.long_rays),
+            ("integer_samples", self.integer_samples),
         ];
         let derived = derived.into_iter().map(|(name, holds)| (name.to_owned(), holds));
         features.chain(rules).chain(functions).chain(self.search.conditions()).chain(derived).collect()

@@ -29,6 +29,8 @@ fn host_and_shader_structs_have_the_same_layout() {
         features: FeatureSet::all(),
         rule: QuadratureRule::MidpointExponential,
         search: KnotSearch::Unrolled(2),
+        long_rays: false,
+        integer_samples: false,
         entry: Entry::March,
     };
     let module = specialise(&variant).unwrap().module;

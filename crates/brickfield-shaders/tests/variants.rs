@@ -10,9 +10,17 @@ fn feature_sets() -> impl Iterator<Item = FeatureSet> {
         .map(|bits| Feature::ALL.into_iter().filter(|f| bits >> *f as u32 & 1 == 1).collect())
 }
 
+/// A variant for short rays through samples that are no 16-bit integers.
+fn variant(features: FeatureSet, rule: QuadratureRule, entry: Entry) -> Variant {
+    Variant { features, rule, search: SEARCH, long_rays: false, integer_samples: false, entry }
+}
+
+fn compile(variant: &Variant) -> Specialised {
+    specialise(variant).unwrap_or_else(|e| panic!("{variant:?}: {e}"))
+}
+
 fn march(features: FeatureSet, rule: QuadratureRule) -> Specialised {
-    specialise(&Variant { features, rule, search: SEARCH, entry: Entry::March })
-        .unwrap_or_else(|e| panic!("{features:?} {rule:?}: {e}"))
+    compile(&variant(features, rule, Entry::March))
 }
 
 fn indices(shader: &Specialised) -> Vec<u32> {
@@ -23,9 +31,13 @@ fn indices(shader: &Specialised) -> Vec<u32> {
 fn every_variant_of_the_march_compiles() {
     for features in feature_sets() {
         for rule in QuadratureRule::ALL {
-            let shader = march(features, rule);
-            assert!(shader.spirv().unwrap().len() > 100);
-            assert_eq!(shader.workgroup_size, [8, 8, 1]);
+            for (long_rays, integer_samples) in [(false, false), (true, false), (false, true), (true, true)] {
+                let variant = Variant { long_rays, integer_samples, ..variant(features, rule, Entry::March) };
+                let shader = compile(&variant);
+                assert!(shader.spirv().unwrap().len() > 100);
+                assert_eq!(shader.workgroup_size, [8, 8, 1]);
+                assert_eq!(indices(&shader).contains(&8), long_rays);
+            }
         }
     }
 }
@@ -35,9 +47,11 @@ fn every_variant_of_every_function_compiles() {
     for features in feature_sets() {
         for rule in QuadratureRule::ALL {
             for function in ShaderFunction::ALL {
-                let variant = Variant { features, rule, search: SEARCH, entry: Entry::Evaluate(function) };
-                let shader = specialise(&variant).unwrap_or_else(|e| panic!("{variant:?}: {e}"));
-                assert!(shader.bindings.iter().any(|b| b.index == 7 && b.kind == BindingKind::StorageReadWrite));
+                for integer_samples in [false, true] {
+                    let entry = Entry::Evaluate(function);
+                    let shader = compile(&Variant { integer_samples, ..variant(features, rule, entry) });
+                    assert!(shader.bindings.iter().any(|b| b.index == 7 && b.kind == BindingKind::StorageReadWrite));
+                }
             }
         }
     }
@@ -51,8 +65,7 @@ fn every_search_compiles_and_only_the_last_loops() {
         for (rule, entry) in
             [(QuadratureRule::MidpointExponential, classify), (QuadratureRule::PreIntegrated, Entry::March)]
         {
-            let shader =
-                specialise(&Variant { features, rule, search, entry }).unwrap_or_else(|e| panic!("{search:?}: {e}"));
+            let shader = compile(&Variant { search, ..variant(features, rule, entry) });
             assert!(entry == Entry::March || shader.wgsl.contains("for (") == (search == KnotSearch::Loop));
         }
     }
@@ -92,7 +105,7 @@ fn functions_bind_what_they_read() {
     let bindings = |function| {
         let rule = QuadratureRule::Gauss2;
         let features = FeatureSet::default().with(Feature::TransferLookup);
-        indices(&specialise(&Variant { features, rule, search: SEARCH, entry: Entry::Evaluate(function) }).unwrap())
+        indices(&compile(&variant(features, rule, Entry::Evaluate(function))))
     };
     assert_eq!(bindings(ShaderFunction::Alpha), [6, 7]);
     assert_eq!(bindings(ShaderFunction::Classify), [0, 4, 6, 7]);

@@ -8,9 +8,7 @@ use brickfield_frame::{
     AtlasShape, Backend, Description, Feature, Frame, FramePlan, FrameUniforms, KnotUniform, RenderError,
     ShaderFunction, Timing,
 };
-use brickfield_shaders::{
-    Entry, LLVMPIPE_LOOP_ROUNDS, ShaderLibrary, Variant, loop_rounds, shader_inputs, shader_outputs,
-};
+use brickfield_shaders::{Entry, ShaderLibrary, Variant, passes, pixels_per_pass, shader_inputs, shader_outputs};
 use wgpu::{BufferUsages, Features};
 
 use crate::atlas::{self, Atlas};
@@ -39,6 +37,7 @@ struct Scene {
     uniforms: Reused,
     index: Reused,
     knots: Reused,
+    seen_before: Reused,
     inputs: Reused,
     results: Reused,
     sampler: wgpu::Sampler,
@@ -88,16 +87,6 @@ impl WgpuBackend {
         Ok(())
     }
 
-    fn check_loops(&self, plan: &FramePlan) -> Result<(), RenderError> {
-        let counts = self.device.description.adapter.contains("llvmpipe");
-        if counts && loop_rounds(plan) > LLVMPIPE_LOOP_ROUNDS {
-            return Err(RenderError::Unsupported {
-                what: "take so many steps on a ray: llvmpipe ends all loops after 65,535 rounds",
-            });
-        }
-        Ok(())
-    }
-
     fn check_features(&self, plan: &FramePlan) -> Result<(), RenderError> {
         let filtered_floats = plan.features.contains(Feature::HardwareFilter)
             && plan.bricks.format() == brickfield_frame::SampleFormat::Float32;
@@ -107,18 +96,25 @@ impl WgpuBackend {
         Ok(())
     }
 
-    /// Runs the march over the picture; device and wall time in milliseconds.
-    fn march(&mut self, plan: &FramePlan) -> Result<(Option<f64>, f64), RenderError> {
-        let size = plan.size();
+    /// Runs the march over the picture, pass by pass; device and wall time in milliseconds.
+    fn march(&mut self, plan: &FramePlan, uniforms: FrameUniforms) -> Result<(Option<f64>, f64), RenderError> {
         let pipeline = self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?;
         let [x, y, _] = pipeline.workgroup_size;
-        let groups = [size.x.div_ceil(x), size.y.div_ceil(y), 1];
+        if pipeline.binds(8) {
+            self.scene.seen_before.reserve(&self.device, pixels_per_pass(plan, y) * size_of::<[f32; 4]>() as u64)?;
+        }
         let clock = self.clock.as_ref();
-        let started = Instant::now();
-        dispatch(&self.device, pipeline, &self.scene, groups, clock)?;
-        self.device.wait("rendering")?;
-        let wall_ms = milliseconds(started);
-        let device_ms = clock.map(|c| c.milliseconds(&self.device)).transpose()?;
+        let (mut device_ms, mut wall_ms) = (clock.map(|_| 0.0), 0.0);
+        for pass in passes(plan, y) {
+            let started = Instant::now();
+            let groups = [plan.size().x.div_ceil(x), (pass.rows.len() as u32).div_ceil(y), 1];
+            self.scene.uniforms.write(&self.device, bytemuck::bytes_of(&uniforms.in_pass(&pass)))?;
+            dispatch(&self.device, pipeline, &self.scene, groups, clock)?;
+            self.device.wait("rendering")?;
+            wall_ms += milliseconds(started);
+            let pass_ms = clock.map(|c| c.milliseconds(&self.device)).transpose()?;
+            device_ms = device_ms.zip(pass_ms).map(|(sum, ms)| sum + ms);
+        }
         Ok((device_ms, wall_ms))
     }
 
@@ -145,15 +141,14 @@ impl Backend for WgpuBackend {
             return Ok(Frame { image: Image::transparent(size), timing: Timing::default() });
         }
         self.check_features(plan)?;
-        self.check_loops(plan)?;
         let started = Instant::now();
         let pipeline = self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?;
-        self.scene.update(&self.device, plan, pipeline)?;
+        let uniforms = self.scene.update(&self.device, plan, pipeline)?;
         self.scene.resize(&self.device, size)?;
         self.device.queue.submit([]);
         self.device.wait("uploading")?;
         let upload_ms = milliseconds(started);
-        let (device_ms, wall_ms) = self.march(plan)?;
+        let (device_ms, wall_ms) = self.march(plan, uniforms)?;
         let started = Instant::now();
         let Some(picture) = &self.scene.picture else { return Err(unbound()) };
         let image = picture.read(&self.device, &mut self.staging)?;
@@ -186,6 +181,7 @@ impl Scene {
             uniforms: Reused::new("the frame's uniforms", BufferUsages::UNIFORM | BufferUsages::COPY_DST),
             index: Reused::new("the brick index", storage),
             knots: Reused::new("the transfer function", storage),
+            seen_before: Reused::new("rays between passes", storage),
             inputs: Reused::new("the inputs", storage),
             results: Reused::new("the results", BufferUsages::STORAGE | BufferUsages::COPY_SRC),
             sampler: device.device.create_sampler(&wgpu::SamplerDescriptor {
@@ -199,15 +195,16 @@ impl Scene {
         }
     }
 
-    /// Brings to the device what `pipeline` reads of `plan`.
-    fn update(&mut self, device: &Device, plan: &FramePlan, pipeline: &Pipeline) -> Result<(), RenderError> {
+    /// Brings to the device what `pipeline` reads of `plan`; returns the uniforms, as they are for a single pass.
+    fn update(&mut self, device: &Device, plan: &FramePlan, pipeline: &Pipeline) -> Result<FrameUniforms, RenderError> {
         let shape = if pipeline.binds(1) {
             self.hold_atlas(device, plan)?
         } else {
             AtlasShape { bricks: brickfield_core::glam::UVec3::ONE, side: plan.bricks.side() }
         };
+        let uniforms = FrameUniforms::of(plan, shape);
         if pipeline.binds(0) {
-            self.uniforms.write(device, bytemuck::bytes_of(&FrameUniforms::of(plan, shape)))?;
+            self.uniforms.write(device, bytemuck::bytes_of(&uniforms))?;
         }
         if pipeline.binds(3) {
             self.index.write(device, bytemuck::cast_slice(plan.index.words()))?;
@@ -215,7 +212,7 @@ impl Scene {
         if pipeline.binds(4) {
             self.knots.write(device, bytemuck::cast_slice(&KnotUniform::of(plan)))?;
         }
-        Ok(())
+        Ok(uniforms)
     }
 
     fn hold_atlas(&mut self, device: &Device, plan: &FramePlan) -> Result<AtlasShape, RenderError> {
@@ -247,6 +244,7 @@ impl Scene {
             5 => self.picture.as_ref().map(|p| wgpu::BindingResource::TextureView(&p.view)),
             6 => self.inputs.binding(),
             7 => self.results.binding(),
+            8 => self.seen_before.binding(),
             _ => None,
         }
     }

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use anyhow::Context;
 use brickfield::bricks::{BrickTree, BuildOptions, Downsampling, build_tree};
-use brickfield::cpu::discrete;
+use brickfield::cpu::{Discrete, discrete};
 use brickfield::frame::{Backend, FramePlan, Mode};
 use brickfield::io::{Limits, open};
 use brickfield::optics::automatic;
@@ -68,11 +68,23 @@ struct Table {
     promises: Vec<Promise>,
 }
 
-/// A frame to be timed.
-struct Contestant {
+/// A frame to be timed: from the scene to the picture in memory, bricks resident.
+struct Contestant<'a> {
     what: String,
     backend: usize,
-    plan: FramePlan,
+    tree: &'a BrickTree,
+    scene: Scene,
+    residency: Residency,
+}
+
+impl Contestant<'_> {
+    /// Renders the frame; milliseconds.
+    fn frame(&mut self, backend: &mut dyn Backend) -> anyhow::Result<f64> {
+        let begin = Instant::now();
+        let plan = prepare(self.tree, &self.scene, &mut self.residency)?;
+        backend.render(&plan)?;
+        Ok(begin.elapsed().as_secs_f64() * 1e3)
+    }
 }
 
 type Backends = Vec<(BackendKind, Box<dyn Backend>)>;
@@ -139,26 +151,31 @@ fn skipping(
     table: &mut Table,
 ) -> anyhow::Result<()> {
     let tree = tree(volume, BrickSide::S32)?;
-    let plan = |mode, skip| -> anyhow::Result<FramePlan> {
-        Ok(prepare(&tree, &scene(options, volume, mode, skip)?, &mut Residency::default())?)
-    };
     let invisible = Scene {
         transfer: TransferFunction::constant(0.0, [1.0; 3])?,
         ..scene(options, volume, Mode::FAST, Skipping::On)?
     };
-    let plans = [
-        ("fast, skipping", plan(Mode::FAST, Skipping::On)?),
-        ("fast, no skipping", plan(Mode::FAST, Skipping::Off)?),
-        ("exact, skipping", plan(Mode::Exact, Skipping::On)?),
-        ("nothing to see", prepare(&tree, &invisible, &mut Residency::default())?),
+    let scenes = [
+        ("fast, skipping", scene(options, volume, Mode::FAST, Skipping::On)?),
+        ("fast, no skipping", scene(options, volume, Mode::FAST, Skipping::Off)?),
+        ("exact, skipping", scene(options, volume, Mode::Exact, Skipping::On)?),
+        ("exact, no skipping", scene(options, volume, Mode::Exact, Skipping::Off)?),
+        ("nothing to see", invisible),
     ];
     let mut contestants = Vec::new();
-    for (what, plan) in &plans {
-        for backend in 0..backends.len() {
-            contestants.push(Contestant { what: format!("{name}, {what}"), backend, plan: plan.clone() });
-        }
+    for (what, scene) in &scenes {
+        contestants.extend((0..backends.len()).map(|backend| Contestant {
+            what: format!("{name}, {what}"),
+            backend,
+            tree: &tree,
+            scene: scene.clone(),
+            residency: Residency::default(),
+        }));
     }
-    let times = alternate(options, &contestants, backends)?;
+    let times = alternate(options, &mut contestants, backends)?;
+    let plan = |i: usize| prepare(&tree, &scenes[i].1, &mut Residency::default());
+    let (with, without) = (plan(0)?, plan(1)?);
+    let reference = discrete(&with);
     for (kind, backend) in backends.iter_mut() {
         let of = |what: &str| {
             times
@@ -176,7 +193,7 @@ fn skipping(
             measured: 20.0 / of("nothing to see").max(1e-3),
             at_least: 1.0,
         });
-        table.promises.push(equal_images(name, kind.name(), backend.as_mut(), &plans[0].1, &plans[1].1)?);
+        table.promises.push(equal_images(name, kind.name(), backend.as_mut(), [&with, &without], &reference)?);
     }
     let of = |backend: &str| {
         times.iter().find(|t| t.backend == backend && t.what == format!("{name}, fast, skipping")).map(|t| t.median)
@@ -194,11 +211,10 @@ fn equal_images(
     name: &str,
     backend_name: &str,
     backend: &mut dyn Backend,
-    with: &FramePlan,
-    without: &FramePlan,
+    [with, without]: [&FramePlan; 2],
+    reference: &Discrete,
 ) -> anyhow::Result<Promise> {
-    let reference = discrete(with);
-    let tolerance = Tolerance::of(with, &reference, &backend.describe().capabilities)?;
+    let tolerance = Tolerance::of(with, reference, &backend.describe().capabilities)?;
     let holds = |image: &Image<f32>| tolerance.judge(image, &reference.image).complaint.is_none();
     let both = [backend.render(with)?.image, backend.render(without)?.image];
     let equal = both.iter().all(holds);
@@ -214,38 +230,48 @@ fn sides(
     backends: &mut Backends,
     table: &mut Table,
 ) -> anyhow::Result<()> {
+    let trees = BrickSide::ALL.into_iter().map(|side| tree(volume, side)).collect::<anyhow::Result<Vec<_>>>()?;
     let mut contestants = Vec::new();
-    for side in BrickSide::ALL {
-        let tree = tree(volume, side)?;
-        let plan = prepare(&tree, &scene(options, volume, Mode::FAST, Skipping::On)?, &mut Residency::default())?;
-        println!(
-            "{name}, bricks of {side}: {} resident, {:.1} MB",
-            plan.bricks.n_bricks(),
-            plan.bricks.bytes().len() as f64 / 1e6
-        );
-        for backend in 0..backends.len() {
-            contestants.push(Contestant { what: format!("{name}, bricks of {side}"), backend, plan: plan.clone() });
+    for (side, tree) in BrickSide::ALL.into_iter().zip(&trees) {
+        for (mode, mode_name) in [(Mode::FAST, "fast"), (Mode::Exact, "exact")] {
+            let scene = scene(options, volume, mode, Skipping::On)?;
+            let bricks = prepare(tree, &scene, &mut Residency::default())?.bricks;
+            if mode == Mode::Exact {
+                let megabytes = bricks.bytes().len() as f64 / 1e6;
+                println!("{name}, bricks of {side}: {} resident, {megabytes:.1} MB", bricks.n_bricks());
+            }
+            contestants.extend((0..backends.len()).map(|backend| Contestant {
+                what: format!("{name}, {mode_name}, bricks of {side}"),
+                backend,
+                tree,
+                scene: scene.clone(),
+                residency: Residency::default(),
+            }));
         }
     }
-    table.times.extend(alternate(options, &contestants, backends)?);
+    table.times.extend(alternate(options, &mut contestants, backends)?);
     Ok(())
 }
 
 /// Every contestant once a round. The first round warms up (uploads, shaders) and is not counted.
-fn alternate(options: &Options, contestants: &[Contestant], backends: &mut Backends) -> anyhow::Result<Vec<Times>> {
+fn alternate(
+    options: &Options,
+    contestants: &mut [Contestant<'_>],
+    backends: &mut Backends,
+) -> anyhow::Result<Vec<Times>> {
     let mut ms = vec![Vec::new(); contestants.len()];
     for round in 0..=options.rounds {
-        for (contestant, ms) in contestants.iter().zip(&mut ms) {
+        for (contestant, ms) in contestants.iter_mut().zip(&mut ms) {
             let backend = &mut backends[contestant.backend].1;
             // A backend holds one set of bricks: the second frame in a row uploads nothing.
-            backend.render(&contestant.plan)?;
-            let timing = backend.render(&contestant.plan)?.timing;
+            contestant.frame(backend.as_mut())?;
+            let frame_ms = contestant.frame(backend.as_mut())?;
             if round > 0 {
-                ms.push(timing.wall_ms);
+                ms.push(frame_ms);
             }
         }
     }
-    let times = |(c, ms): (&Contestant, Vec<f64>)| {
+    let times = |(c, ms): (&Contestant<'_>, Vec<f64>)| {
         let (min, max) = ms.iter().fold((f64::INFINITY, 0.0f64), |m, t| (m.0.min(*t), m.1.max(*t)));
         let t =
             Times { what: c.what.clone(), backend: backends[c.backend].0.name().into(), median: median(ms), min, max };

@@ -1,8 +1,8 @@
 //! The tolerance rules. They are rules, not magic: no case states a tolerance of its own.
 //!
 //! **Exact mode**, against the discrete f64 answer, all four channels: |difference| <= 1e-4 up to 2,048 samples a ray and
-//! 2.5e-4 up to 8,192; 99.9 % of the pixels within 1e-5. Both are wider by the reference's `ambiguity` of the pixel, and by
-//! nothing else. Longer rays have no rule: a case with longer rays is a defect.
+//! 2.5e-4 above, for no sum is longer than 8,192 segments and the sums of passes are few; 99.9 % of the pixels within 1e-5.
+//! Both are wider by the reference's `ambiguity` of the pixel, and by nothing else.
 //!
 //! **Fast mode** adds, per pixel, what hardware filtering may do (`filter`) and, where a ray may end early, the
 //! transmittance floor: that is the most that any channel can lose behind the point where it ends.
@@ -23,6 +23,8 @@ const BULK: f64 = 0.999;
 const BULK_BOUND: f64 = 1e-5;
 /// What three quarters of a fast picture's pixels must be held to at least.
 const EMPTY_PROMISE: f64 = 0.2;
+/// Longer rays have no rule: a plan has at most so many segments.
+const MOST_SAMPLES: u64 = 2 * brickfield::MAX_SEGMENTS as u64;
 
 /// What each pixel may differ by, in every channel; rows from the top.
 #[derive(Clone, Debug)]
@@ -58,7 +60,7 @@ pub enum Complaint {
     Bounded { pixel: UVec2, what: &'static str },
     #[error(transparent)]
     NotComparable(#[from] MetricError),
-    #[error("rays of {n_samples} samples: the rules end at 8192")]
+    #[error("rays of {n_samples} samples: the rules end at {MOST_SAMPLES}")]
     NoRule { n_samples: u64 },
     #[error("a quarter of the pixels may differ by more than {bound:.2}: the tolerance promises nothing")]
     EmptyPromise { bound: f64 },
@@ -154,7 +156,7 @@ pub(crate) fn pixel(size: UVec2, i: usize) -> UVec2 {
 fn most_difference(plan: &FramePlan) -> Result<f64, Complaint> {
     match longest_ray(plan) {
         0..=2048 => Ok(1e-4),
-        2049..=8192 => Ok(2.5e-4),
+        2049..=MOST_SAMPLES => Ok(2.5e-4),
         n_samples => Err(Complaint::NoRule { n_samples }),
     }
 }

@@ -102,6 +102,14 @@ mutants! {
         => "stop = max(k + 1.0, min(stop + 2.0, min(walk.end, walk.last)));";
     /// A jump over a transparent block goes 24 segments too far: two reach only the dark rim of what follows.
     JUMPS_TOO_FAR: "jumps-too-far", "march", "k = stop;" => "k = stop + 24.0;";
+    /// What earlier passes saw of a ray is forgotten.
+    PASS_FORGETS: "pass-forgets", "march", "before = seen_before[slot];" => "before = vec4f(0.0);";
+    /// A pass begins at the ray's first segment.
+    PASS_RESTARTS: "pass-restarts", "march", "walk.k = max(walk.k, frame.visible_max.w);" => "";
+    /// 16-bit samples are counted from the first knot's as fractions, not as integers.
+    FRACTIONS_OF_16_BITS: "fractions-of-16-bits", "bricks",
+        "round(textureLoad(atlas, i, 0).x * 65535.0) - frame.last_sample.w"
+        => "(textureLoad(atlas, i, 0).x - frame.last_sample.w / 65535.0) * 65535.0";
     /// Rays end at a transmittance of 1/5.
     ENDS_EARLY: "ends-early", "march", "exp(-seen.w) < frame.direction_down.w" => "exp(-seen.w) < 0.2";
     /// Opacity is the depth.

@@ -57,6 +57,11 @@ impl Pipeline {
         Ok(pipeline)
     }
 
+    /// Whether the shader has a binding of this number.
+    pub(crate) fn binds(&self, index: u32) -> bool {
+        self.bindings.iter().any(|b| b.index == index)
+    }
+
     /// Whether the shader has a binding of a kind.
     pub(crate) fn needs(&self, kind: BindingKind) -> bool {
         self.bindings.iter().any(|b| b.kind == kind)
@@ -160,10 +165,7 @@ impl Pipeline {
             .stage(vk::ShaderStageFlags::COMPUTE)
             .module(module)
             .name(&name);
-        let info = vk::ComputePipelineCreateInfo::default()
-            .flags(vk::PipelineCreateFlags::DISPATCH_BASE)
-            .stage(stage)
-            .layout(self.layout);
+        let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout);
         // SAFETY: module and layout are alive; the layout was made from the module's own bindings.
         let made = unsafe { device.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
         // SAFETY: a pipeline does not need its module any more.

@@ -104,15 +104,22 @@ impl<'q, 'a> Recorder<'q, 'a> {
         unsafe { self.device.cmd_clear_color_image(self.commands, image.raw, layout, &zero, &[WHOLE]) };
     }
 
-    /// Runs `n` workgroups along x, y, z, from workgroup `first`.
-    pub(crate) fn dispatch(&mut self, bound: &'a BoundPipeline<'a>, first: [u32; 3], n: [u32; 3]) {
+    /// Writes the start of a buffer: at most 64 KiB, a multiple of 4 bytes.
+    pub(crate) fn update(&mut self, buffer: &'a Buffer, bytes: &[u8]) {
+        assert!(bytes.len() as u64 <= buffer.n_bytes().min(1 << 16) && bytes.len().is_multiple_of(4), "an odd update");
+        // SAFETY: the bytes are copied now, they are inside the buffer (asserted), which outlives the run and allows copies.
+        unsafe { self.device.cmd_update_buffer(self.commands, buffer.raw, 0, bytes) };
+    }
+
+    /// Runs `n` workgroups along x, y, z.
+    pub(crate) fn dispatch(&mut self, bound: &'a BoundPipeline<'a>, n: [u32; 3]) {
         let (pipeline, compute) = (bound.pipeline, vk::PipelineBindPoint::COMPUTE);
-        // SAFETY: the pipeline, its set and what is bound outlive the run; the pipeline allows a base; callers keep the
-        // number of workgroups within 65,535, which every device allows.
+        // SAFETY: the pipeline, its set and what is bound outlive the run; callers keep the number of workgroups within
+        // 65,535, which every device allows.
         unsafe {
             self.device.cmd_bind_pipeline(self.commands, compute, pipeline.raw);
             self.device.cmd_bind_descriptor_sets(self.commands, compute, pipeline.layout, 0, &[pipeline.set], &[]);
-            self.device.cmd_dispatch_base(self.commands, first[0], first[1], first[2], n[0], n[1], n[2]);
+            self.device.cmd_dispatch(self.commands, n[0], n[1], n[2]);
         }
     }
 }

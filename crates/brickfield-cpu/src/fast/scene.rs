@@ -41,7 +41,7 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
         let decode = plan.bricks.decode();
         let gain = decode.scale / S::FORMAT.unit();
         let bias = match S::FORMAT {
-            SampleFormat::Unorm16 => ((transfer.origin - decode.offset) / gain).round().clamp(0.0, 65535.0),
+            SampleFormat::Unorm16 => plan.bricks.nearest_stored(transfer.origin),
             SampleFormat::Unorm8 | SampleFormat::Float32 => 0.0,
         };
         Scene {

@@ -12,7 +12,7 @@ use crate::conformance::shader_mutants as shader;
 use crate::volumes::spread;
 
 pub(super) fn cases() -> Vec<Case> {
-    [depths(), voxels(), shapes(), places()].into_iter().flatten().collect()
+    [depths(), voxels(), shapes(), places(), long_rays()].into_iter().flatten().collect()
 }
 
 /// tau h from 1e-12 to 1e12, and what lies between on one ray.
@@ -90,6 +90,13 @@ fn voxels() -> Vec<Case> {
         picture("extreme/offset-1e9", catches![DecodeOffset, KnotMoved], move || {
             Setup::new(offset(), over(1e9 + 0.2, 1e9 + 0.9))
         }),
+        // Seven of 65,536 values, in the middle, where a fraction has too few digits for what lies between two of them.
+        picture("extreme/16-bits-narrow", catches![shader::FRACTIONS_OF_16_BITS, KnotMoved], move || {
+            let honest = hills(&grid(), ScalarType::F32);
+            let counts = (0..honest.voxels().len()).map(|i| (8.0 * (honest.voxels().at(i) - 0.5)).round() as i16);
+            let volume = Volume::new(grid(), counts.collect::<Vec<i16>>()).expect("as many voxels");
+            Setup::new(volume, over(-3.0, 3.0)).step(0.25)
+        }),
         picture("extreme/values-1e30", catches![RedBlueSwapped, ExtinctionScaled], move || {
             Setup::new(huge(), over(-3e29, 4e29))
         }),
@@ -144,6 +151,29 @@ fn long_voxels() -> Setup {
     let knots = [knot(0.0, 0.0, WARM), knot(1.0, 0.01, COOL)];
     let transfer = spread(&knots, ScalarType::U16).expect("knots ascend");
     Setup::new(hills(&grid, ScalarType::U16), transfer)
+}
+
+/// Rays that no backend marches in one go.
+fn long_rays() -> Vec<Case> {
+    // 999 knots up and down, so that every segment crosses many: the shaders search them in a loop.
+    let comb = || {
+        let knot_at = |i: u32| {
+            let value = f64::from(i) / 998.0;
+            knot(value, 0.02 + 0.06 * f64::from(i % 2), [value, 0.5, 1.0 - value])
+        };
+        spread(&(0..999).map(knot_at).collect::<Vec<_>>(), ScalarType::F32).expect("knots ascend")
+    };
+    let seen_by_few = |s: &mut brickfield::Scene| s.size = UVec2::new(3, 2);
+    vec![
+        picture("extreme/a-million-samples", catches![shader::PASS_FORGETS, shader::PASS_RESTARTS], move || {
+            let setup = Setup::new(hills(&grid(), ScalarType::U16), soft(ScalarType::U16));
+            setup.step(4e-5).parallel(DVec3::new(1.0, 0.02, 0.03), 24.0).with(seen_by_few)
+        }),
+        picture("extreme/many-pieces", catches![shader::PASS_FORGETS, shader::NO_ATTENUATION], move || {
+            let setup = Setup::new(hills(&grid(), ScalarType::F32), comb()).rule(QuadratureRule::PreIntegrated);
+            setup.step(0.25)
+        }),
+    ]
 }
 
 /// Far from the world's origin, far from the volume, and in the middle of a voxel.

@@ -1,0 +1,69 @@
+//! How a frame is cut into dispatches: none takes long, no loop goes round too often, no sum grows too long.
+
+use brickfield_frame::{FramePlan, Pass, QuadratureRule};
+
+use crate::KnotSearch;
+
+/// All loops of an invocation together end after so many rounds on Mesa's llvmpipe (`LP_MAX_TGSI_LOOP_ITERATIONS`), without
+/// a word.
+const MOST_ROUNDS: f64 = 65_535.0;
+/// Most segments that are added up one by one: the rounding errors of longer sums would show.
+const MOST_SEGMENTS: f64 = 8192.0;
+/// Most nodes in one dispatch: about a second on a slow device, whose driver may end what takes longer.
+const MOST_NODES: f64 = (1u32 << 28) as f64;
+
+/// The dispatches of a plan's frame, in order; rows are cut at multiples of `group_height`.
+pub fn passes(plan: &FramePlan, group_height: u32) -> Vec<Pass> {
+    let (height, n_rows) = (plan.size().y, rows_per_pass(plan, group_height));
+    let bands = (0..height).step_by(n_rows as usize).map(|first| first..height.min(first + n_rows));
+    bands
+        .flat_map(|rows| segment_ranges(plan).into_iter().map(move |s| Pass { rows: rows.clone(), segments: s }))
+        .collect()
+}
+
+/// Most pixels in any pass of a plan.
+pub fn pixels_per_pass(plan: &FramePlan, group_height: u32) -> u64 {
+    u64::from(rows_per_pass(plan, group_height).min(plan.size().y)) * u64::from(plan.size().x)
+}
+
+/// Whether rays need several passes.
+pub(crate) fn has_long_rays(plan: &FramePlan) -> bool {
+    plan.rays.n_segments > segments_per_pass(plan)
+}
+
+/// Ranges that cover all segments; the outer ones are open, so that rounding loses none.
+fn segment_ranges(plan: &FramePlan) -> Vec<std::ops::Range<f32>> {
+    let most = segments_per_pass(plan);
+    let n = (plan.rays.n_segments / most).ceil().max(1.0) as u32;
+    let cut = |i: u32| match i {
+        0 => f32::MIN,
+        i if i == n => f32::MAX,
+        i => (f64::from(i) * most) as f32,
+    };
+    (0..n).map(|i| cut(i)..cut(i + 1)).collect()
+}
+
+fn segments_per_pass(plan: &FramePlan) -> f64 {
+    (MOST_ROUNDS / rounds_per_segment(plan)).min(MOST_SEGMENTS).floor().max(1.0)
+}
+
+/// How often the loops of the march go round for a segment, at most: once each to find its block, to enter it and to
+/// integrate; for each piece between knots; and for each halving of a search that is a loop.
+fn rounds_per_segment(plan: &FramePlan) -> f64 {
+    let rule = plan.sampling.rule();
+    let n_knots = plan.transfer.knots().len() as f64;
+    let pieces = if rule == QuadratureRule::PreIntegrated { n_knots + 1.0 } else { 0.0 };
+    let search = match KnotSearch::of(plan) {
+        KnotSearch::Unrolled(_) => 0.0,
+        KnotSearch::Loop => (n_knots.log2() + 1.0).floor() * rule.nodes().len() as f64,
+    };
+    3.0 + pieces + search
+}
+
+fn rows_per_pass(plan: &FramePlan, group_height: u32) -> u32 {
+    let voxels_per_segment = plan.rays.direction[0].length() * plan.sampling.step_world();
+    let n_segments = (plan.visible.diagonal() / voxels_per_segment).clamp(1.0, segments_per_pass(plan));
+    let nodes_per_row = n_segments * plan.sampling.rule().nodes().len() as f64 * f64::from(plan.size().x);
+    // A float that is too large becomes the largest integer.
+    ((MOST_NODES / nodes_per_row) as u32 / group_height).max(1).saturating_mul(group_height)
+}
