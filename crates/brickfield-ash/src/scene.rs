@@ -1,10 +1,10 @@
 //! What a plan brings to the device: bricks, index, transfer function, uniforms.
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 use ash::vk;
 use brickfield_core::glam::UVec3;
-use brickfield_frame::{AtlasShape, FramePlan, FrameUniforms, KnotUniform, RenderError};
+use brickfield_frame::{AtlasShape, FramePlan, FrameUniforms, KnotUniform, Occupancy, RenderError};
 use brickfield_shaders::BindingKind;
 
 use crate::atlas::{Atlas, atlas_shape, check_format};
@@ -22,6 +22,8 @@ pub(crate) struct Scene {
     index: Slot,
     knots: Slot,
     seen_before: Slot,
+    /// And the map that is in it.
+    occupancy: (Slot, Weak<Occupancy>),
 }
 
 /// A buffer that grows when it must, and how much of it is used.
@@ -43,6 +45,7 @@ impl Scene {
             index: Slot::new("the brick index", vk::BufferUsageFlags::STORAGE_BUFFER),
             knots: Slot::new("the transfer function", vk::BufferUsageFlags::STORAGE_BUFFER),
             seen_before: Slot::new("rays between passes", vk::BufferUsageFlags::STORAGE_BUFFER),
+            occupancy: (Slot::new("the occupancy of bricks", vk::BufferUsageFlags::STORAGE_BUFFER), Weak::new()),
         })
     }
 
@@ -67,7 +70,29 @@ impl Scene {
             copies.push((slot.reserve(&self.device, bytes.len())?, bytes));
         }
         staging.fill(queue, &copies)?;
+        if pipeline.binds(9) {
+            let missing =
+                || RenderError::Shader { message: "it reads an occupancy that the plan does not have".into() };
+            self.hold_occupancy(queue, staging, plan.occupancy.as_ref().ok_or_else(missing)?)?;
+        }
         Ok(uniforms)
+    }
+
+    fn hold_occupancy(
+        &mut self,
+        queue: &mut Queue,
+        staging: &mut Staging,
+        occupancy: &Arc<Occupancy>,
+    ) -> Result<(), RenderError> {
+        let (slot, held) = &mut self.occupancy;
+        // An address in a `Weak` is not used again while the `Weak` lives.
+        if !std::ptr::eq(held.as_ptr(), Arc::as_ptr(occupancy)) {
+            *held = Weak::new();
+            let bytes = occupancy.distances();
+            staging.fill(queue, &[(slot.reserve(&self.device, bytes.len())?, bytes)])?;
+            *held = Arc::downgrade(occupancy);
+        }
+        Ok(())
     }
 
     /// Makes room for what `n_pixels` rays saw in one pass, and the next must know.
@@ -89,6 +114,7 @@ impl Scene {
             3 => self.index.resource(),
             4 => self.knots.resource(),
             8 => self.seen_before.resource(),
+            9 => self.occupancy.0.resource(),
             _ => None,
         }
     }

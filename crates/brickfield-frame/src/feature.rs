@@ -10,6 +10,8 @@ pub enum Feature {
     EarlyTermination,
     /// Some bricks of the index are not resident: rays jump over them.
     SkipTransparent,
+    /// Some macrocells of resident bricks are dark: rays leap over them.
+    SkipMacrocells,
     /// The cut has bricks of several levels.
     MultiLevel,
     /// The transfer function has several knots, and needs a lookup.
@@ -18,10 +20,11 @@ pub enum Feature {
 
 impl Feature {
     /// All features.
-    pub const ALL: [Feature; 5] = [
+    pub const ALL: [Feature; 6] = [
         Feature::HardwareFilter,
         Feature::EarlyTermination,
         Feature::SkipTransparent,
+        Feature::SkipMacrocells,
         Feature::MultiLevel,
         Feature::TransferLookup,
     ];
@@ -32,6 +35,7 @@ impl Feature {
             Feature::HardwareFilter => "hardware_filter",
             Feature::EarlyTermination => "early_termination",
             Feature::SkipTransparent => "skip_transparent",
+            Feature::SkipMacrocells => "skip_macrocells",
             Feature::MultiLevel => "multi_level",
             Feature::TransferLookup => "transfer_lookup",
         }

@@ -24,6 +24,9 @@ pub struct Variant {
     pub entry: Entry,
 }
 
+/// What makes a ray ask for bricks.
+const BRICKS: [Feature; 3] = [Feature::TransferLookup, Feature::SkipTransparent, Feature::SkipMacrocells];
+
 /// How the knots of a transfer function are searched.
 ///
 /// Unrolled: on lavapipe that is 1.3 to 1.4 times as fast as a loop over four knots.
@@ -113,7 +116,7 @@ impl Variant {
         let derived = [
             ("one_node", !two_nodes),
             ("two_nodes", two_nodes),
-            ("bricks", has(Feature::TransferLookup) || has(Feature::SkipTransparent)),
+            ("bricks", BRICKS.into_iter().any(has)),
             ("long_rays", self.long_rays),
             ("integer_samples", self.integer_samples),
         ];

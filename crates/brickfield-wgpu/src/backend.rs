@@ -1,11 +1,12 @@
 //! The backend: what stays on the device, and the replay of a plan.
 
+use std::sync::{Arc, Weak};
 use std::time::Instant;
 
 use brickfield_core::Image;
 use brickfield_core::glam::UVec2;
 use brickfield_frame::{
-    AtlasShape, Backend, Description, Feature, Frame, FramePlan, FrameUniforms, KnotUniform, RenderError,
+    AtlasShape, Backend, Description, Feature, Frame, FramePlan, FrameUniforms, KnotUniform, Occupancy, RenderError,
     ShaderFunction, Timing,
 };
 use brickfield_shaders::{Entry, ShaderLibrary, Variant, passes, pixels_per_pass, shader_inputs, shader_outputs};
@@ -38,6 +39,8 @@ struct Scene {
     index: Reused,
     knots: Reused,
     seen_before: Reused,
+    /// And the map that is in it.
+    occupancy: (Reused, Weak<Occupancy>),
     inputs: Reused,
     results: Reused,
     sampler: wgpu::Sampler,
@@ -182,6 +185,7 @@ impl Scene {
             index: Reused::new("the brick index", storage),
             knots: Reused::new("the transfer function", storage),
             seen_before: Reused::new("rays between passes", storage),
+            occupancy: (Reused::new("the occupancy of bricks", storage), Weak::new()),
             inputs: Reused::new("the inputs", storage),
             results: Reused::new("the results", BufferUsages::STORAGE | BufferUsages::COPY_SRC),
             sampler: device.device.create_sampler(&wgpu::SamplerDescriptor {
@@ -212,7 +216,22 @@ impl Scene {
         if pipeline.binds(4) {
             self.knots.write(device, bytemuck::cast_slice(&KnotUniform::of(plan)))?;
         }
+        if pipeline.binds(9) {
+            self.hold_occupancy(device, plan)?;
+        }
         Ok(uniforms)
+    }
+
+    fn hold_occupancy(&mut self, device: &Device, plan: &FramePlan) -> Result<(), RenderError> {
+        let Some(occupancy) = &plan.occupancy else { return Err(unbound()) };
+        let (buffer, held) = &mut self.occupancy;
+        // An address in a `Weak` is not used again while the `Weak` lives.
+        if !std::ptr::eq(held.as_ptr(), Arc::as_ptr(occupancy)) {
+            *held = Weak::new();
+            buffer.write(device, occupancy.distances())?;
+            *held = Arc::downgrade(occupancy);
+        }
+        Ok(())
     }
 
     fn hold_atlas(&mut self, device: &Device, plan: &FramePlan) -> Result<AtlasShape, RenderError> {
@@ -245,6 +264,7 @@ impl Scene {
             6 => self.inputs.binding(),
             7 => self.results.binding(),
             8 => self.seen_before.binding(),
+            9 => self.occupancy.0.binding(),
             _ => None,
         }
     }

@@ -58,16 +58,24 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
         return Err(PrepareError::TooManyBricks { n_bricks: resident.len(), limit: IndexEntry::MAX_SLOTS });
     }
     let index = index_grid(tree, &resident);
-    let features = features(scene, &index, &resident);
+    let visible = visible_box(tree, &resident, &domain);
+    let levels_differ = resident.iter().any(|id| id.level != Level(0));
+    let bricks = residency.hold(tree, resident);
+    let occupancy = match scene.skipping {
+        Skipping::On => residency.occupancy(&scene.transfer),
+        Skipping::Off => None,
+    };
+    let features = features(scene, &index, levels_differ, occupancy.is_some());
     Ok(FramePlan {
         dims: grid.dims(),
         rays: RayFrame::new(&scene.camera, grid, scene.size, &volume_box(tree), step_world),
         domain,
-        visible: visible_box(tree, &resident, &domain),
+        visible,
         sampling,
         transfer: scene.transfer.clone(),
         index,
-        bricks: residency.hold(tree, resident),
+        bricks,
+        occupancy,
         features,
     })
 }
@@ -188,8 +196,7 @@ fn visible_box(tree: &BrickTree, resident: &[BrickId], domain: &Aabb) -> Aabb {
     if visible.is_empty() { empty } else { visible }
 }
 
-fn features(scene: &Scene, index: &IndexGrid, resident: &[BrickId]) -> FeatureSet {
-    let levels_differ = resident.iter().any(|id| id.level != Level(0));
+fn features(scene: &Scene, index: &IndexGrid, levels_differ: bool, any_dark: bool) -> FeatureSet {
     let any_transparent =
         index.words().iter().any(|w| matches!(IndexEntry::unpack(*w), IndexEntry::Transparent { .. }));
     let fast = matches!(scene.mode, Mode::Fast { .. });
@@ -198,6 +205,7 @@ fn features(scene: &Scene, index: &IndexGrid, resident: &[BrickId]) -> FeatureSe
         (Feature::HardwareFilter, fast),
         (Feature::EarlyTermination, ends_early),
         (Feature::SkipTransparent, any_transparent),
+        (Feature::SkipMacrocells, any_dark),
         (Feature::MultiLevel, levels_differ),
         (Feature::TransferLookup, scene.transfer.knots().len() > 1),
     ];

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use brickfield_bricks::{BrickSamples, BrickTree, with_brick_samples};
-use brickfield_core::{BrickId, Scalar, ScalarType};
-use brickfield_frame::{BrickSet, Decode};
+use brickfield_core::{BrickId, Scalar, ScalarType, TransferFunction};
+use brickfield_frame::{BrickSet, Decode, MacrocellRanges, Occupancy};
 use rayon::prelude::*;
 
 /// The brick set of the last frame. A frame that needs the same bricks gets the same set, and backends upload nothing.
@@ -12,6 +12,9 @@ use rayon::prelude::*;
 pub struct Residency {
     bricks: Vec<BrickId>,
     set: Option<Arc<BrickSet>>,
+    /// Of the set, once a frame asked for it.
+    ranges: Option<MacrocellRanges>,
+    occupancy: Option<(TransferFunction, Option<Arc<Occupancy>>)>,
 }
 
 impl Residency {
@@ -26,9 +29,21 @@ impl Residency {
             Some(set) if self.bricks == bricks => Arc::clone(set),
             _ => {
                 let set = Arc::new(gather(tree, &bricks));
-                self.bricks = bricks;
-                self.set = Some(Arc::clone(&set));
+                *self = Residency { bricks, set: Some(Arc::clone(&set)), ranges: None, occupancy: None };
                 set
+            }
+        }
+    }
+
+    /// What a transfer function shows of the held set; `None` if it shows something of every macrocell.
+    pub(crate) fn occupancy(&mut self, transfer: &TransferFunction) -> Option<Arc<Occupancy>> {
+        match &self.occupancy {
+            Some((of, occupancy)) if of == transfer => occupancy.clone(),
+            _ => {
+                let set = self.set.as_deref()?;
+                let occupancy = self.ranges.get_or_insert_with(|| MacrocellRanges::of(set)).occupancy(transfer);
+                self.occupancy = Some((transfer.clone(), occupancy.clone()));
+                occupancy
             }
         }
     }

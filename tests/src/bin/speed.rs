@@ -33,6 +33,9 @@ struct Options {
     /// Side of the picture in pixels
     #[arg(long, default_value_t = 512)]
     size: u32,
+    /// Only contestants whose name contains this; promises need all
+    #[arg(long, value_name = "TEXT", conflicts_with = "check")]
+    only: Option<String>,
     /// A part of the adapter's name, or its number
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
@@ -259,6 +262,8 @@ fn alternate(
     contestants: &mut [Contestant<'_>],
     backends: &mut Backends,
 ) -> anyhow::Result<Vec<Times>> {
+    let wanted = |c: &Contestant<'_>| options.only.as_ref().is_none_or(|only| c.what.contains(only));
+    let mut contestants: Vec<_> = contestants.iter_mut().filter(|c| wanted(c)).collect();
     let mut ms = vec![Vec::new(); contestants.len()];
     for round in 0..=options.rounds {
         for (contestant, ms) in contestants.iter_mut().zip(&mut ms) {
@@ -271,7 +276,7 @@ fn alternate(
             }
         }
     }
-    let times = |(c, ms): (&Contestant<'_>, Vec<f64>)| {
+    let times = |(c, ms): (&&mut Contestant<'_>, Vec<f64>)| {
         let (min, max) = ms.iter().fold((f64::INFINITY, 0.0f64), |m, t| (m.0.min(*t), m.1.max(*t)));
         let t =
             Times { what: c.what.clone(), backend: backends[c.backend].0.name().into(), median: median(ms), min, max };

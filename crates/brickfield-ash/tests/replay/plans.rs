@@ -72,6 +72,7 @@ pub(crate) fn plan(bricks: BrickSet, transfer: TransferFunction, rule: Quadratur
         transfer,
         index,
         bricks: Arc::new(bricks),
+        occupancy: None,
         features,
     }
 }

@@ -80,7 +80,8 @@ impl Stored for Float32 {
 /// Adding this to a number between -2^22 and 2^22 rounds it to an integer, which the sum's low bits then hold.
 const ROUND: f32 = 12_582_912.0;
 
-/// Evenly spaced nodes in a brick: positions in its own samples, [0, n - 1] once clamped to `last`.
+/// Evenly spaced nodes in a brick, of which any may be asked for: positions in its own samples, [0, n - 1] once clamped to
+/// `last`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Nodes {
     pub(super) origin: [f32; 3],
@@ -92,21 +93,20 @@ pub(super) struct Nodes {
 }
 
 impl Nodes {
-    /// The stored numbers (less the bias) at `first`, `first` + 1, ...: linear along x, then y, then z.
+    /// The stored numbers (less the bias) at nodes `at` (fractions lie between): linear along x, then y, then z.
     #[inline(always)]
-    pub(super) fn stored<const N: usize, S: Stored>(&self, brick: &[u8], first: f32) -> Lanes {
+    pub(super) fn stored<const N: usize, S: Stored>(&self, brick: &[u8], at: &Lanes) -> Lanes {
         let brick = &brick[..N * N * N * S::N_BYTES];
         let (mut base, mut fraction) = ([0u32; LANES], [[0f32; LANES]; 3]);
         for (axis, fraction) in fraction.iter_mut().enumerate() {
-            let (change, last) = (self.change[axis], self.last[axis]);
-            let origin = self.origin[axis] + change * first;
+            let (origin, change, last) = (self.origin[axis], self.change[axis], self.last[axis]);
             let stride = N.pow(axis as u32) as u32;
             for l in 0..LANES {
-                let s = at_least(at_most(origin + change * l as f32, last), 0.0);
-                // Below or at s: where s is an integer, either cell has its value.
-                let rounded = (s - 0.5) + ROUND;
-                fraction[l] = s - (rounded - ROUND);
-                base[l] += (rounded.to_bits() & (N as u32 - 1)) * stride;
+                let s = at_least(at_most(origin + change * at[l], last), 0.0);
+                // Where s is an integer, either cell has its value.
+                let (cell, low) = floor_bits(s);
+                fraction[l] = s - low;
+                base[l] += (cell & (N as u32 - 1)) * stride;
             }
         }
         let mut pairs = [[S::Pair::default(); LANES]; 4];
@@ -137,13 +137,20 @@ fn mix(a: f32, b: f32, f: f32) -> f32 {
     a + (b - a) * f
 }
 
+/// The integer below s, or s itself or the one before where s is an integer: in the low bits of a word, and as a float.
+#[inline(always)]
+pub(super) fn floor_bits(s: f32) -> (u32, f32) {
+    let rounded = (s - 0.5) + ROUND;
+    (rounded.to_bits(), rounded - ROUND)
+}
+
 /// `f32::max` without its care for NaN: one instruction.
 #[inline(always)]
-fn at_least(x: f32, low: f32) -> f32 {
+pub(super) fn at_least(x: f32, low: f32) -> f32 {
     if x > low { x } else { low }
 }
 
 #[inline(always)]
-fn at_most(x: f32, high: f32) -> f32 {
+pub(super) fn at_most(x: f32, high: f32) -> f32 {
     if x < high { x } else { high }
 }

@@ -5,8 +5,8 @@ use brickfield_core::glam::DVec3;
 use brickfield_frame::{IndexEntry, PlanRay};
 
 use super::batch;
-use super::brick::{LANES, Nodes, Stored};
-use super::detail::{Parts, Runs};
+use super::brick::{LANES, Lanes, Nodes, Stored};
+use super::detail::Runs;
 use super::scene::{Block, Scene};
 use super::segment::{Ray32, Segment32, segment};
 
@@ -15,6 +15,9 @@ struct Path<'a> {
     ray: &'a PlanRay,
     span: Span,
     step: f64,
+    /// Segments per world unit, and world units per voxel along each axis.
+    per_unit: f64,
+    reciprocal: DVec3,
     first: i64,
     end: i64,
 }
@@ -41,7 +44,9 @@ pub(super) fn march<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRa
     let Some(span) = clip(ray, relative(&plan.domain), least) else { return [0.0; 4] };
     let Some(visible) = clip(ray, relative(&plan.visible), least) else { return [0.0; 4] };
     let step = plan.sampling.step_world();
-    let path = Path { ray, span, step, first: floor(span.start / step), end: floor(span.end / step) + 1 };
+    let (per_unit, reciprocal) = (1.0 / step, ray.direction.recip());
+    let (first, end) = (floor(span.start / step), floor(span.end / step) + 1);
+    let path = Path { ray, span, step, per_unit, reciprocal, first, end };
     let from = path.first.max(floor(visible.start / step) - 1);
     let to = path.end.min(floor(visible.end / step) + 2);
     let mut state = Ray32::default();
@@ -93,8 +98,8 @@ fn run<const N: usize, S: Stored>(
 ) -> i64 {
     let t = (k as f64 + near) * path.step;
     let block = scene.block(scene.center + path.ray.at(t));
-    let exit = exit(scene, path.ray, &block);
-    let n = ((exit / path.step - far).ceil() - k as f64).min((to.min(path.end - 1) - k) as f64) as i64;
+    let exit = exit(scene, path, &block);
+    let n = ((exit * path.per_unit - far).ceil() - k as f64).min((to.min(path.end - 1) - k) as f64) as i64;
     if let (IndexEntry::Resident { slot, level }, true) = (block.entry, n > 0) {
         let scale = 1.0 / f64::from(level.stride());
         let array = |v: DVec3| v.as_vec3().to_array();
@@ -104,59 +109,89 @@ fn run<const N: usize, S: Stored>(
             last: array(((scene.last - block.corner) * scale).min(DVec3::splat((N - 1) as f64))),
             bias: scene.bias,
         };
-        let inner = Inner { brick: scene.brick(slot), nodes, far: (far - near) as f32 };
-        match scene.visible.get(slot as usize) {
-            Some(&parts) if parts != Parts::MAX => {
-                Runs::new::<N>(&nodes, inner.far, parts, n).for_each(|(from, to)| inner.march(scene, from, to, state));
+        let far = (far - near) as f32;
+        let mut inner = Inner { brick: scene.brick(slot), nodes, far, waiting: [0.0; LANES], n_waiting: 0 };
+        match &scene.plan.occupancy {
+            Some(occupancy) => {
+                let floor = scene.plan.sampling.transmittance_floor();
+                for (from, to) in Runs::<N>::new(&nodes, far, occupancy.brick(slot), n) {
+                    inner.push(scene, from, to, state);
+                    if state.transmittance < floor {
+                        break;
+                    }
+                }
             }
-            _ => inner.march(scene, 0, n, state),
+            None => inner.push(scene, 0, n, state),
         }
+        inner.flush(scene, state);
     }
     n
 }
 
 /// Where the ray leaves a block.
 #[inline(always)]
-fn exit<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRay, block: &Block) -> f64 {
-    let origin = ray.anchor + scene.center;
+fn exit<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, block: &Block) -> f64 {
+    let origin = path.ray.anchor + scene.center;
     let mut exit = f64::INFINITY;
     for axis in 0..3 {
-        let d = ray.direction[axis];
+        let d = path.ray.direction[axis];
         let face = if d > 0.0 { block.high[axis] } else { block.low[axis] };
         if d != 0.0 {
-            exit = exit.min((face - origin[axis]) / d);
+            exit = exit.min((face - origin[axis]) * path.reciprocal[axis]);
         }
     }
-    exit + ray.t_anchor
+    exit + path.ray.t_anchor
 }
 
-/// A run of segments inside one brick.
+/// The segments of a ray inside one brick, and which of them wait to be looked at together.
 struct Inner<'a> {
     brick: &'a [u8],
     /// The segments' first nodes.
     nodes: Nodes,
     /// Distance between the rule's nodes, in segments.
     far: f32,
+    /// Segments that wait.
+    waiting: Lanes,
+    n_waiting: usize,
 }
 
 impl Inner<'_> {
-    /// Puts segments `from..to` behind what has been seen so far.
+    /// Puts segments `from..to` behind what has been seen so far, but for the last ones, which wait.
+    ///
+    /// Segments of several short runs share a batch.
     #[inline(always)]
-    fn march<const N: usize, S: Stored>(&self, scene: &Scene<N, S>, from: i64, to: i64, state: &mut Ray32) {
-        let sampling = &scene.plan.sampling;
-        let (rule, length, floor) = (sampling.rule(), sampling.step_world() as f32, sampling.transmittance_floor());
-        for first in (from..to).step_by(LANES) {
-            let n = ((to - first) as usize).min(LANES);
-            let near = scene.values(&self.nodes, self.brick, first as f32);
-            match rule.nodes().len() {
-                1 => batch::one_node(rule, &scene.transfer, near, n, length, state),
-                _ => {
-                    let far = scene.values(&self.nodes, self.brick, first as f32 + self.far);
-                    batch::two_nodes(rule, &scene.transfer, (&near, &far), n, length, state);
+    fn push<const N: usize, S: Stored>(&mut self, scene: &Scene<N, S>, from: i64, to: i64, state: &mut Ray32) {
+        let mut k = from;
+        while k < to {
+            let n = (LANES - self.n_waiting).min((to - k) as usize);
+            for l in 0..n {
+                self.waiting[self.n_waiting + l] = (k + l as i64) as f32;
+            }
+            self.n_waiting += n;
+            k += n as i64;
+            if self.n_waiting == LANES {
+                self.flush(scene, state);
+                if state.transmittance < scene.plan.sampling.transmittance_floor() {
+                    return;
                 }
             }
-            if state.transmittance < floor {
-                return;
+        }
+    }
+
+    /// Looks at the segments that wait.
+    #[inline(always)]
+    fn flush<const N: usize, S: Stored>(&mut self, scene: &Scene<N, S>, state: &mut Ray32) {
+        let (rule, length) = (scene.plan.sampling.rule(), scene.plan.sampling.step_world() as f32);
+        let n = std::mem::take(&mut self.n_waiting);
+        if n == 0 {
+            return;
+        }
+        let near = scene.values(&self.nodes, self.brick, &self.waiting);
+        match rule.nodes().len() {
+            1 => batch::one_node(rule, &scene.transfer, near, n, length, state),
+            _ => {
+                let far = scene.values(&self.nodes, self.brick, &self.waiting.map(|at| at + self.far));
+                batch::two_nodes(rule, &scene.transfer, (&near, &far), n, length, state);
             }
         }
     }

@@ -12,14 +12,13 @@ mod segment;
 use std::time::Instant;
 
 use brickfield_core::glam::{DVec3, UVec2};
-use brickfield_core::{BrickSide, Image, TransferFunction};
+use brickfield_core::{BrickSide, Image};
 use brickfield_frame::{
     Backend, Capabilities, Description, Frame, FramePlan, IndexEntry, RenderError, SampleFormat, ShaderFunction, Timing,
 };
 use rayon::prelude::*;
 
 use brick::{Float32, Stored, Unorm8, Unorm16};
-use detail::{Detail, Parts};
 use scene::Scene;
 
 /// Most pixels along a side of a picture.
@@ -32,15 +31,12 @@ const MAX_IMAGE: u32 = 1 << 16;
 #[derive(Clone, Debug)]
 pub struct CpuBackend {
     description: Description,
-    /// Of the last plan with something to pass over.
-    detail: Option<Detail>,
 }
 
 impl CpuBackend {
     /// The backend for this machine.
     pub fn new() -> CpuBackend {
         CpuBackend {
-            detail: None,
             description: Description {
                 backend: "cpu",
                 adapter: cpu_model(),
@@ -79,12 +75,8 @@ impl Backend for CpuBackend {
             return Ok(Frame { image: Image::transparent(plan.size()), timing: Timing::default() });
         }
         let begin = Instant::now();
-        self.detail = has_dark(&plan.transfer).then(|| Detail::of(plan, self.detail.take()));
-        let visible = self.detail.as_ref().map_or(&[][..], Detail::visible);
-        let upload_ms = milliseconds(begin);
-        let begin = Instant::now();
-        let image = dispatch(plan, visible, Rendering);
-        Ok(Frame { image, timing: Timing { upload_ms, wall_ms: milliseconds(begin), ..Timing::default() } })
+        let image = dispatch(plan, Rendering);
+        Ok(Frame { image, timing: Timing { wall_ms: milliseconds(begin), ..Timing::default() } })
     }
 
     fn evaluate(
@@ -94,7 +86,7 @@ impl Backend for CpuBackend {
         inputs: &[[f32; 4]],
     ) -> Result<Vec<[f32; 4]>, RenderError> {
         check(plan)?;
-        Ok(dispatch(plan, &[], Evaluation { function, inputs }))
+        Ok(dispatch(plan, Evaluation { function, inputs }))
     }
 }
 
@@ -104,19 +96,19 @@ trait Work {
     fn run<const N: usize, S: Stored>(self, scene: &Scene<N, S>) -> Self::Output;
 }
 
-fn dispatch<W: Work>(plan: &FramePlan, visible: &[Parts], work: W) -> W::Output {
+fn dispatch<W: Work>(plan: &FramePlan, work: W) -> W::Output {
     match plan.bricks.format() {
-        SampleFormat::Unorm8 => dispatch_side::<Unorm8, W>(plan, visible, work),
-        SampleFormat::Unorm16 => dispatch_side::<Unorm16, W>(plan, visible, work),
-        SampleFormat::Float32 => dispatch_side::<Float32, W>(plan, visible, work),
+        SampleFormat::Unorm8 => dispatch_side::<Unorm8, W>(plan, work),
+        SampleFormat::Unorm16 => dispatch_side::<Unorm16, W>(plan, work),
+        SampleFormat::Float32 => dispatch_side::<Float32, W>(plan, work),
     }
 }
 
-fn dispatch_side<S: Stored, W: Work>(plan: &FramePlan, visible: &[Parts], work: W) -> W::Output {
+fn dispatch_side<S: Stored, W: Work>(plan: &FramePlan, work: W) -> W::Output {
     match plan.bricks.side() {
-        BrickSide::S16 => work.run(&Scene::<16, S>::new(plan, visible)),
-        BrickSide::S32 => work.run(&Scene::<32, S>::new(plan, visible)),
-        BrickSide::S64 => work.run(&Scene::<64, S>::new(plan, visible)),
+        BrickSide::S16 => work.run(&Scene::<16, S>::new(plan)),
+        BrickSide::S32 => work.run(&Scene::<32, S>::new(plan)),
+        BrickSide::S64 => work.run(&Scene::<64, S>::new(plan)),
     }
 }
 
@@ -225,11 +217,6 @@ fn check(plan: &FramePlan) -> Result<(), RenderError> {
         return Err(RenderError::Unsupported { what: "draw a brick that the plan does not bring" });
     }
     Ok(())
-}
-
-/// Whether some values are invisible.
-fn has_dark(transfer: &TransferFunction) -> bool {
-    transfer.knots().iter().any(|k| k.extinction == 0.0)
 }
 
 fn milliseconds(since: Instant) -> f64 {

@@ -3,9 +3,8 @@
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_frame::{FramePlan, IndexEntry, SampleFormat};
 
-use super::brick::{Lanes, Nodes, Stored};
+use super::brick::{LANES, Lanes, Nodes, Stored};
 use super::classify::Classifier;
-use super::detail::Parts;
 
 /// A plan whose bricks have N samples a side, stored as `S`.
 pub(super) struct Scene<'a, const N: usize, S> {
@@ -19,8 +18,6 @@ pub(super) struct Scene<'a, const N: usize, S> {
     pub(super) offset: f32,
     /// The stored number nearest to the first knot; 0 but for 16-bit ones.
     pub(super) bias: f32,
-    /// The visible parts of each brick; empty if that is not known.
-    pub(super) visible: &'a [Parts],
     stored: std::marker::PhantomData<S>,
 }
 
@@ -36,7 +33,7 @@ pub(super) struct Block {
 }
 
 impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
-    pub(super) fn new(plan: &'a FramePlan, visible: &'a [Parts]) -> Self {
+    pub(super) fn new(plan: &'a FramePlan) -> Self {
         let transfer = Classifier::new(&plan.transfer);
         let decode = plan.bricks.decode();
         let gain = decode.scale / S::FORMAT.unit();
@@ -52,7 +49,6 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
             offset: (bias * gain + decode.offset - transfer.origin) as f32,
             bias: bias as f32,
             transfer,
-            visible,
             stored: std::marker::PhantomData,
         }
     }
@@ -63,8 +59,10 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
         const { assert!(N.is_power_of_two()) }
         let n_cells = (N - 1) as f64;
         let dims = self.plan.index.dims();
-        // Truncation is floor: a clamped position is not negative.
-        let cell = (q.clamp(DVec3::ZERO, self.last) / n_cells).as_uvec3().min(dims - 1);
+        // Truncation is floor: a clamped position is not negative. Half a sample away from every face, the quotient's
+        // rounding does not matter.
+        let sample = q.clamp(DVec3::ZERO, self.last).as_ivec3().as_dvec3();
+        let cell = ((sample + 0.5) * (1.0 / n_cells)).as_ivec3().as_uvec3().min(dims - 1);
         let entry = self.plan.index.at(cell);
         let level = u32::from(entry.level().0);
         let low = cell >> level << level;
@@ -85,13 +83,13 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
         let s = (q.clamp(DVec3::ZERO, self.last) - block.corner) / f64::from(level.stride());
         let nodes =
             Nodes { origin: s.as_vec3().to_array(), change: [0.0; 3], last: [(N - 1) as f32; 3], bias: self.bias };
-        Some(self.values(&nodes, self.brick(slot), 0.0)[0])
+        Some(self.values(&nodes, self.brick(slot), &[0.0; LANES])[0])
     }
 
-    /// The values at nodes `first`, `first` + 1, ..., relative to the first knot.
+    /// The values at nodes `at`, relative to the first knot.
     #[inline(always)]
-    pub(super) fn values(&self, nodes: &Nodes, brick: &[u8], first: f32) -> Lanes {
-        nodes.stored::<N, S>(brick, first).map(|stored| stored * self.gain + self.offset)
+    pub(super) fn values(&self, nodes: &Nodes, brick: &[u8], at: &Lanes) -> Lanes {
+        nodes.stored::<N, S>(brick, at).map(|stored| stored * self.gain + self.offset)
     }
 
     /// The bytes of the brick in a slot.

@@ -8,7 +8,8 @@ use brickfield_core::{
     Aabb, BrickId, BrickLayout, BrickSide, Camera, Grid, Knot, Level, Projection, ScalarType, TransferFunction, Volume,
 };
 use brickfield_frame::{
-    BrickSet, Decode, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, RayFrame, SampleFormat, Sampling,
+    BrickSet, Decode, FeatureSet, FramePlan, IndexEntry, IndexGrid, MacrocellRanges, Mode, RayFrame, SampleFormat,
+    Sampling,
 };
 use brickfield_optics::QuadratureRule;
 
@@ -84,6 +85,9 @@ impl<'a> Setup<'a> {
             sampling: Sampling::new(self.step_world, self.rule, self.mode).unwrap(),
             transfer: self.transfer.clone(),
             index,
+            occupancy: (self.skip == Skip::Transparent)
+                .then(|| MacrocellRanges::of(&bricks).occupancy(&self.transfer))
+                .flatten(),
             bricks: Arc::new(bricks),
             features: FeatureSet::all(),
         }

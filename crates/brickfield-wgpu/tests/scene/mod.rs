@@ -104,6 +104,7 @@ impl Scene {
             visible: visible.unwrap_or(Aabb { min: domain.min, max: domain.min }),
             sampling: Sampling::new(self.step, self.rule, self.mode).unwrap(),
             transfer: self.transfer.clone(),
+            occupancy: None,
             features: self.features(&index),
             index,
             bricks: Arc::new(BrickSet::new(SIDE, self.format, decode, bytes).unwrap()),
