@@ -101,7 +101,9 @@ fn main() -> anyhow::Result<ExitCode> {
         skipping(&options, name, at_least, &volume, &mut backends, &mut table)?;
         sides(&options, name, &volume, &mut backends, &mut table)?;
     }
-    octree(&options, &mut table)?;
+    if options.only.is_none() {
+        octree(&options, &mut table)?;
+    }
     println!();
     for p in &table.promises {
         let verdict = if p.measured >= p.at_least { "" } else { "  MISSED" };
@@ -179,6 +181,10 @@ fn skipping(
     let plan = |i: usize| prepare(&tree, &scenes[i].1, &mut Residency::default());
     let (with, without) = (plan(0)?, plan(1)?);
     let reference = discrete(&with);
+    if options.only.is_some() {
+        table.times.extend(times);
+        return Ok(());
+    }
     for (kind, backend) in backends.iter_mut() {
         let of = |what: &str| {
             times

@@ -38,8 +38,8 @@ mutants! {
     LERP_SWAPPED: "lerp-swapped", "bricks", "return lerp(lerp(x00, x10, f.y), lerp(x01, x11, f.y), f.z);"
         => "return lerp(lerp(x00, x10, f.x), lerp(x01, x11, f.x), f.z);";
     /// Positions are not clamped to the first and last sample.
-    NO_CLAMP: "no-clamp", "bricks", "let s = clamp(local(block, p), vec3f(0.0), block.last);"
-        => "let s = local(block, p);";
+    NO_CLAMP: "no-clamp", "bricks", "let s = clamp(local(block, p), vec3f(0.0), block.last);\n    return filtered"
+        => "let s = local(block, p);\n    return filtered";
     /// Index rows are as long as columns.
     INDEX_STRIDE: "index-stride", "bricks", "index[cell.x + dims.x * (cell.y + dims.y * cell.z)]"
         => "index[cell.x + dims.y * (cell.y + dims.x * cell.z)]";
@@ -101,7 +101,12 @@ mutants! {
     OVERSTAYS: "overstays", "march", "stop = max(k + 1.0, min(stop, min(walk.end, walk.last)));"
         => "stop = max(k + 1.0, min(stop + 2.0, min(walk.end, walk.last)));";
     /// A jump over a transparent block goes 24 segments too far: two reach only the dark rim of what follows.
-    JUMPS_TOO_FAR: "jumps-too-far", "march", "k = stop;" => "k = stop + 24.0;";
+    JUMPS_TOO_FAR: "jumps-too-far", "march", "k = block_stop;" => "k = block_stop + 24.0;";
+    /// A leap over dark macrocells goes 8 segments too far.
+    LEAPS_TOO_FAR: "leaps-too-far", "march", "k = end;" => "k = end + 8.0;";
+    /// Macrocells are taken for those of the next row.
+    MACROCELL_ROW: "macrocell-row", "bricks", "at.x + n * (at.y + n * (at.z + n * block.slot))"
+        => "at.y + n * (at.x + n * (at.z + n * block.slot))";
     /// What earlier passes saw of a ray is forgotten.
     PASS_FORGETS: "pass-forgets", "march", "before = seen_before[slot];" => "before = vec4f(0.0);";
     /// A pass begins at the ray's first segment.

@@ -116,6 +116,19 @@ fn skipping() -> Vec<Case> {
     cases.push(picture("skip/long-steps-preintegrated", catches![VisibleTooSmall, ExtinctionScaled], move || {
         scene().rule(QuadratureRule::PreIntegrated).step(11.0)
     }));
+    // Inside bricks: much of them is dark, at every side of bricks.
+    for side in BrickSide::ALL {
+        for rule in [QuadratureRule::MidpointExponential, QuadratureRule::PreIntegrated, QuadratureRule::Gauss2] {
+            let mutants = match rule {
+                QuadratureRule::MidpointExponential => catches![shader::LEAPS_TOO_FAR, shader::MACROCELL_ROW],
+                _ => catches![shader::MACROCELL_ROW, ExtinctionScaled],
+            };
+            let case = picture(format!("skip/macrocells-{side}-{}", rule.name()), mutants, move || {
+                Setup::new(sparse(&grid(), ScalarType::U8), soft(ScalarType::U8)).side(side).rule(rule).step(0.4)
+            });
+            cases.push(case);
+        }
+    }
     cases.push(picture("skip/parallel", catches![VisibleTooSmall, shader::JUMPS_TOO_FAR], move || {
         scene().parallel(DVec3::X, 60.0)
     }));
