@@ -15,10 +15,9 @@ const MOST_NODES: f64 = (1u32 << 28) as f64;
 /// The dispatches of a plan's frame, in order; rows are cut at multiples of `group_height`.
 pub fn passes(plan: &FramePlan, group_height: u32) -> Vec<Pass> {
     let (height, n_rows) = (plan.size().y, rows_per_pass(plan, group_height));
+    let ranges = segment_ranges(plan);
     let bands = (0..height).step_by(n_rows as usize).map(|first| first..height.min(first + n_rows));
-    bands
-        .flat_map(|rows| segment_ranges(plan).into_iter().map(move |s| Pass { rows: rows.clone(), segments: s }))
-        .collect()
+    bands.flat_map(|rows| ranges.iter().map(move |s| Pass { rows: rows.clone(), segments: s.clone() })).collect()
 }
 
 /// Most pixels in any pass of a plan.

@@ -80,7 +80,19 @@ struct Contestant<'a> {
     residency: Residency,
 }
 
-impl Contestant<'_> {
+impl<'a> Contestant<'a> {
+    /// A scene on each of the backends.
+    fn on_each(what: &str, tree: &'a BrickTree, scene: &Scene, backends: &Backends) -> Vec<Contestant<'a>> {
+        let on = |backend| Contestant {
+            what: what.to_owned(),
+            backend,
+            tree,
+            scene: scene.clone(),
+            residency: Residency::default(),
+        };
+        (0..backends.len()).map(on).collect()
+    }
+
     /// Renders the frame; milliseconds.
     fn frame(&mut self, backend: &mut dyn Backend) -> anyhow::Result<f64> {
         let begin = Instant::now();
@@ -169,22 +181,16 @@ fn skipping(
     ];
     let mut contestants = Vec::new();
     for (what, scene) in &scenes {
-        contestants.extend((0..backends.len()).map(|backend| Contestant {
-            what: format!("{name}, {what}"),
-            backend,
-            tree: &tree,
-            scene: scene.clone(),
-            residency: Residency::default(),
-        }));
+        contestants.extend(Contestant::on_each(&format!("{name}, {what}"), &tree, scene, backends));
     }
     let times = alternate(options, &mut contestants, backends)?;
-    let plan = |i: usize| prepare(&tree, &scenes[i].1, &mut Residency::default());
-    let (with, without) = (plan(0)?, plan(1)?);
-    let reference = discrete(&with);
     if options.only.is_some() {
         table.times.extend(times);
         return Ok(());
     }
+    let plan = |i: usize| prepare(&tree, &scenes[i].1, &mut Residency::default());
+    let (with, without) = (plan(0)?, plan(1)?);
+    let reference = discrete(&with);
     for (kind, backend) in backends.iter_mut() {
         let of = |what: &str| {
             times
@@ -249,13 +255,8 @@ fn sides(
                 let megabytes = bricks.bytes().len() as f64 / 1e6;
                 println!("{name}, bricks of {side}: {} resident, {megabytes:.1} MB", bricks.n_bricks());
             }
-            contestants.extend((0..backends.len()).map(|backend| Contestant {
-                what: format!("{name}, {mode_name}, bricks of {side}"),
-                backend,
-                tree,
-                scene: scene.clone(),
-                residency: Residency::default(),
-            }));
+            let what = format!("{name}, {mode_name}, bricks of {side}");
+            contestants.extend(Contestant::on_each(&what, tree, &scene, backends));
         }
     }
     table.times.extend(alternate(options, &mut contestants, backends)?);

@@ -153,7 +153,7 @@ fn long_voxels() -> Setup {
     Setup::new(hills(&grid, ScalarType::U16), transfer)
 }
 
-/// Rays that no backend marches in one go.
+/// Rays that no GPU backend marches in one go.
 fn long_rays() -> Vec<Case> {
     // 999 knots up and down, so that every segment crosses many: the shaders search them in a loop.
     let comb = || {
