@@ -232,6 +232,46 @@ proptest! {
     }
 }
 
+/// Specks in the dark: what rays pass over together must hold none of them, whatever the tile's opening.
+#[test]
+fn beams_miss_no_speck() {
+    let tf = TransferFunction::new(vec![knot(40.0, 0.0, [1.0, 0.5, 0.0]), knot(250.0, 0.9, [0.0, 0.5, 1.0])]).unwrap();
+    let mut seen = 0;
+    for seed in 0..60u32 {
+        let speck = |p: DVec3| {
+            let [x, y, z] = p.as_uvec3().to_array();
+            let hash = (x * 73 + y * 179 + z * 283 + seed * 7919).wrapping_mul(2_654_435_761) >> 12;
+            if hash % 9001 < 3 { 255.0 } else { 0.0 }
+        };
+        let volume = support::volume([75, 60, 66], DVec3::new(1.0, 1.4, 0.8), ScalarType::U8, speck);
+        let eye = [0.9, -0.35, 0.2].map(|x| x * f64::from(seed % 7 + 1) / 7.0);
+        let bounds = volume.grid().world_box();
+        let wide = Projection::Perspective { fov_y: 0.3 + 0.045 * f64::from(seed) };
+        let inside = bounds.center() - DVec3::from(eye) * 0.4 * bounds.extent();
+        let camera = match seed % 3 {
+            0 => Camera::look_at(inside, bounds.center(), DVec3::Z, wide).unwrap(),
+            kind => camera_of(&volume, kind as u8 - 1, eye),
+        };
+        let level = |cell: UVec3| if seed % 4 == 0 { (cell.x & 1) as u8 } else { 0 };
+        let plan = Setup {
+            camera,
+            skip: Skip::Transparent,
+            side: BrickSide::ALL[seed as usize % 3],
+            rule: QuadratureRule::ALL[[2, 3, 4, 1][seed as usize % 4]],
+            step_world: 0.2 + 0.03 * f64::from(seed),
+            level: &level,
+            size: UVec2::new(37, 30),
+            ..Setup::new(&volume, tf.clone())
+        }
+        .plan();
+        let expected = discrete(&plan);
+        seen += expected.image.pixels().iter().filter(|p| p[3] > 1e-3).count();
+        let (worst, _) = errors(&render(&plan), &expected);
+        assert!(worst <= 2e-5, "picture {seed}: {worst:e}");
+    }
+    assert!(seen > 1000, "{seen}");
+}
+
 /// One function at a time, against its equation.
 #[test]
 fn functions_equal_their_equations() {

@@ -9,37 +9,28 @@ use super::classify::{Classifier, Stretch};
 use super::scalar::{THIN, alpha, alpha_thin};
 use super::segment::{Ray32, segment};
 
-/// The first `n` segments of a rule with one node, from the values there.
+/// The first `n` segments of a rule with one node, from the values there (the last of them in the lanes behind).
 #[inline(always)]
 pub(super) fn one_node(
     rule: QuadratureRule,
     transfer: &Classifier,
-    mut values: Lanes,
+    values: &Lanes,
     n: usize,
     length: f32,
     state: &mut Ray32,
 ) {
-    if n < LANES {
-        let last = values[n - 1];
-        values[n..].fill(last);
-    }
-    let (low, high) = extent(&values);
+    let (low, high) = extent(values);
     let stretch = transfer.stretch(low);
     if high < transfer.end(stretch) {
         if !transfer.is_dark(stretch) {
-            linear(rule, transfer.linear(stretch), &values, n, length, state);
+            linear(rule, transfer.linear(stretch), values, n, length, state);
         }
         return;
     }
-    for value in &values[..n] {
-        let i = transfer.stretch(*value);
-        if !transfer.is_dark(i) {
-            state.push(segment(rule, transfer, [Some(*value), None], length));
-        }
-    }
+    mixed(rule, transfer, values, n, length, state);
 }
 
-/// The first `n` segments of a rule with two nodes.
+/// The first `n` segments of a rule with two nodes, from the values there (the last of them in the lanes behind).
 #[inline(always)]
 pub(super) fn two_nodes(
     rule: QuadratureRule,
@@ -63,7 +54,7 @@ pub(super) fn two_nodes(
 ///
 /// The colours' sum needs two sums only: of the weights of the stretch's lower end and of its upper.
 #[inline(always)]
-fn linear(rule: QuadratureRule, stretch: Stretch, values: &Lanes, n: usize, length: f32, state: &mut Ray32) {
+fn linear(rule: QuadratureRule, stretch: &Stretch, values: &Lanes, n: usize, length: f32, state: &mut Ray32) {
     let (mut place, mut opacity) = ([0f32; LANES], [0f32; LANES]);
     for l in 0..LANES {
         place[l] = stretch.place(values[l]);
@@ -73,7 +64,37 @@ fn linear(rule: QuadratureRule, stretch: Stretch, values: &Lanes, n: usize, leng
     opacities(rule, &mut opacity, thickest);
     let weight = weights(&opacity[..n], state);
     let (low, high) = sums(&weight, &place);
-    for (sum, x) in state.rgba.iter_mut().zip(stretch.rgba(low, high)) {
+    add(state, stretch.rgba(low, high));
+}
+
+/// Segments whose values lie anywhere.
+#[inline(always)]
+fn mixed(rule: QuadratureRule, transfer: &Classifier, values: &Lanes, n: usize, length: f32, state: &mut Ray32) {
+    let (mut stretches, mut place, mut opacity) = ([0usize; LANES], [0f32; LANES], [0f32; LANES]);
+    for l in 0..LANES {
+        stretches[l] = transfer.stretch(values[l]);
+        let stretch = transfer.linear(stretches[l]);
+        place[l] = stretch.place(values[l]);
+        opacity[l] = stretch.extinction(place[l]) * length;
+    }
+    let thickest = extent(&opacity).1;
+    opacities(rule, &mut opacity, thickest);
+    let weight = weights(&opacity[..n], state);
+    let mut sum = [0f32; 4];
+    for l in 0..n {
+        let stretch = transfer.linear(stretches[l]);
+        let seen = stretch.rgba(weight[l] * (1.0 - place[l]), weight[l] * place[l]);
+        for (sum, x) in sum.iter_mut().zip(seen) {
+            *sum += x;
+        }
+    }
+    add(state, sum);
+}
+
+/// Adds what was seen of some segments.
+#[inline(always)]
+fn add(state: &mut Ray32, seen: [f32; 4]) {
+    for (sum, x) in state.rgba.iter_mut().zip(seen) {
         *sum += f64::from(x);
     }
 }

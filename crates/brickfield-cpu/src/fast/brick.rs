@@ -93,24 +93,36 @@ pub(super) struct Nodes {
 }
 
 impl Nodes {
+    /// The cells along an axis that hold nodes `at`, and how far into them they lie.
+    #[inline(always)]
+    pub(super) fn cells<const N: usize, const L: usize>(&self, axis: usize, at: &[f32; L]) -> ([u32; L], [f32; L]) {
+        let (origin, change, last) = (self.origin[axis], self.change[axis], self.last[axis]);
+        let (mut cells, mut fractions) = ([0; L], [0.0; L]);
+        for l in 0..L {
+            let s = at_least(at_most(origin + change * at[l], last), 0.0);
+            // Where s is an integer, either cell has its value.
+            let (cell, low) = floor_bits(s);
+            cells[l] = cell & (N as u32 - 1);
+            fractions[l] = s - low;
+        }
+        (cells, fractions)
+    }
+
     /// The stored numbers (less the bias) at nodes `at` (fractions lie between): linear along x, then y, then z.
     #[inline(always)]
-    pub(super) fn stored<const N: usize, S: Stored>(&self, brick: &[u8], at: &Lanes) -> Lanes {
+    pub(super) fn stored<const N: usize, S: Stored, const L: usize>(&self, brick: &[u8], at: &[f32; L]) -> [f32; L] {
         let brick = &brick[..N * N * N * S::N_BYTES];
-        let (mut base, mut fraction) = ([0u32; LANES], [[0f32; LANES]; 3]);
+        let (mut base, mut fraction) = ([0u32; L], [[0f32; L]; 3]);
         for (axis, fraction) in fraction.iter_mut().enumerate() {
-            let (origin, change, last) = (self.origin[axis], self.change[axis], self.last[axis]);
             let stride = N.pow(axis as u32) as u32;
-            for l in 0..LANES {
-                let s = at_least(at_most(origin + change * at[l], last), 0.0);
-                // Where s is an integer, either cell has its value.
-                let (cell, low) = floor_bits(s);
-                fraction[l] = s - low;
-                base[l] += (cell & (N as u32 - 1)) * stride;
+            let (cells, fractions) = self.cells::<N, L>(axis, at);
+            for l in 0..L {
+                base[l] += cells[l] * stride;
             }
+            *fraction = fractions;
         }
-        let mut pairs = [[S::Pair::default(); LANES]; 4];
-        for l in 0..LANES {
+        let mut pairs = [[S::Pair::default(); L]; 4];
+        for l in 0..L {
             // Holds anyway; so the compiler knows it too.
             let i = (base[l] as usize).min(N * N * N - N * N - N - 2);
             for (pair, corner) in pairs.iter_mut().zip([0, N, N * N, N * N + N]) {
@@ -118,9 +130,9 @@ impl Nodes {
             }
         }
         let [fx, fy, fz] = &fraction;
-        let mut out = [0f32; LANES];
-        for l in 0..LANES {
-            let row = |p: &[S::Pair; LANES]| {
+        let mut out = [0f32; L];
+        for l in 0..L {
+            let row = |p: &[S::Pair; L]| {
                 let (a, b) = S::split(p[l], self.bias);
                 mix(a, b, fx[l])
             };
@@ -139,14 +151,14 @@ fn mix(a: f32, b: f32, f: f32) -> f32 {
 
 /// The integer below s, or s itself or the one before where s is an integer: in the low bits of a word, and as a float.
 #[inline(always)]
-pub(super) fn floor_bits(s: f32) -> (u32, f32) {
+fn floor_bits(s: f32) -> (u32, f32) {
     let rounded = (s - 0.5) + ROUND;
     (rounded.to_bits(), rounded - ROUND)
 }
 
 /// `f32::max` without its care for NaN: one instruction.
 #[inline(always)]
-pub(super) fn at_least(x: f32, low: f32) -> f32 {
+fn at_least(x: f32, low: f32) -> f32 {
     if x > low { x } else { low }
 }
 

@@ -84,8 +84,8 @@ impl Classifier {
 
     /// Stretch `i`.
     #[inline(always)]
-    pub(super) fn linear(&self, i: usize) -> Stretch {
-        self.stretches[i]
+    pub(super) fn linear(&self, i: usize) -> &Stretch {
+        &self.stretches[i]
     }
 
     /// Whether nothing of stretch `i` is visible.

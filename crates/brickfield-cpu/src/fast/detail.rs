@@ -2,102 +2,122 @@
 
 use brickfield_frame::MACROCELL_SIDE;
 
-use super::brick::{Nodes, at_least, at_most, floor_bits};
+use super::brick::{LANES, Lanes, Nodes, at_most};
 
-/// The runs of segments with something visible among segments `0..n`, near nodes at `nodes`, far ones `far` behind.
-///
-/// All three axes (and one that stands still) are done at a time.
-pub(super) struct Runs<'a, const N: usize> {
-    /// In macrocells: the first node, the change from node to node, and where positions end.
-    origin: [f32; 4],
-    change: [f32; 4],
-    last: [f32; 4],
-    /// Reciprocal of the change; 0 where there is none, and then the exit is infinitely far.
-    inverse: [f32; 4],
-    never: [f32; 4],
-    /// 1 where nodes move up, -1 where they move down.
-    sign: [f32; 4],
+/// Distances from which on a leap reaches beyond a batch of short steps.
+const FAR: u8 = 3;
+
+/// Tells which segments of a ray inside one brick see nothing.
+pub(super) struct Sieve<'a, const N: usize> {
+    /// The segments' first nodes.
+    nodes: Nodes,
+    /// Distance between the rule's nodes, in segments.
     far: f32,
     /// Distances of the brick's macrocells to the nearest visible one.
     distances: &'a [u8],
-    at: i64,
-    n: i64,
 }
 
-impl<'a, const N: usize> Runs<'a, N> {
+impl<'a, const N: usize> Sieve<'a, N> {
     const N_MACROCELLS: usize = N / MACROCELL_SIDE as usize;
 
     #[inline(always)]
-    pub(super) fn new(nodes: &Nodes, far: f32, distances: &'a [u8], n: i64) -> Self {
-        let macrocells = |v: [f32; 3]| [v[0], v[1], v[2], 0.0].map(|x| x * (1.0 / MACROCELL_SIDE as f32));
-        let change = macrocells(nodes.change);
-        Runs {
-            origin: macrocells(nodes.origin),
-            change,
-            last: macrocells(nodes.last),
-            inverse: change.map(|c| if c == 0.0 { 0.0 } else { 1.0 / c }),
-            never: change.map(|c| if c == 0.0 { f32::INFINITY } else { 0.0 }),
-            sign: change.map(|c| if c > 0.0 { 1.0 } else { -1.0 }),
-            far,
-            distances: &distances[..Self::N_MACROCELLS.pow(3)],
-            at: 0,
-            n,
-        }
+    pub(super) fn new(nodes: Nodes, far: f32, distances: &'a [u8]) -> Self {
+        Sieve { nodes, far, distances: &distances[..Self::N_MACROCELLS.pow(3)] }
     }
 
-    /// Whether segment `j` is dark, and the first segment behind it that may not be like it.
+    /// Which segments of the batch from `first` on may see something, as bits; and the first one behind it that may.
     #[inline(always)]
-    fn stretch(&self, j: i64) -> (bool, i64) {
-        let n = Self::N_MACROCELLS;
-        let (mut index, mut place) = ([0u32; 4], [0f32; 4]);
-        for axis in 0..4 {
-            let s = self.origin[axis] + self.change[axis] * j as f32;
-            // A node on a face belongs to the macrocells on both sides.
-            (index[axis], place[axis]) = floor_bits(at_least(at_most(s, self.last[axis]), 0.0));
-            index[axis] &= n as u32 - 1;
+    pub(super) fn batch(&self, first: i32) -> (u32, i32) {
+        let mut at = [0f32; LANES];
+        for (l, at) in at.iter_mut().enumerate() {
+            *at = (first + l as i32) as f32;
         }
-        let i = index[0] as usize + n * (index[1] as usize + n * index[2] as usize);
-        let distance = self.distances[i];
-        let reach = f32::from(distance.max(1)) - 0.5;
-        let mut exits = [0f32; 4];
-        for axis in 0..4 {
-            let face = place[axis] + 0.5 + self.sign[axis] * reach;
-            let exit = (face - self.origin[axis]) * self.inverse[axis] + self.never[axis];
-            // The brick's own faces end the run anyway.
-            exits[axis] = if face > 0.0 && face < n as f32 { exit } else { f32::INFINITY };
-        }
-        let exit = at_most(at_most(exits[0], exits[1]), exits[2]);
-        if distance == 0 {
-            return (false, ceil(exit).max(j + 1));
-        }
-        let next = ceil(exit - self.far);
-        if next > j { (true, next) } else { (self.far == 0.0, j + 1) }
-    }
-}
-
-/// The least integer not below; at most 2^31.
-#[inline(always)]
-fn ceil(x: f32) -> i64 {
-    let x = at_most(x, 2_147_483_520.0);
-    let down = x as i32;
-    i64::from(down) + i64::from((down as f32) < x)
-}
-
-impl<const N: usize> Iterator for Runs<'_, N> {
-    type Item = (i64, i64);
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<(i64, i64)> {
-        let mut from = None;
-        while self.at < self.n {
-            let (is_dark, next) = self.stretch(self.at);
-            match (is_dark, from) {
-                (true, Some(from)) => return Some((from, self.at)),
-                (false, None) => from = Some(self.at),
-                _ => {}
+        let near = self.macrocells(&at);
+        let distances = self.distances(&near);
+        let visible = match self.far {
+            0.0 => bits(|l| distances[l] == 0),
+            far => {
+                at.iter_mut().for_each(|at| *at += far);
+                pairs(&near, &self.macrocells(&at), &distances)
             }
-            self.at = next.min(self.n);
+        };
+        let (behind, distance) = (first + LANES as i32, distances[LANES - 1]);
+        if visible != 0 || distance < FAR {
+            return (visible, behind);
         }
-        from.map(|from| (from, self.n))
+        let last = [near[0][LANES - 1], near[1][LANES - 1], near[2][LANES - 1]];
+        (0, self.leaves(last, distance).max(behind))
     }
+
+    /// The distances of macrocells.
+    #[inline(always)]
+    fn distances(&self, [x, y, z]: &[[u32; LANES]; 3]) -> [u8; LANES] {
+        let n = Self::N_MACROCELLS as u32;
+        let mut distances = [0; LANES];
+        for l in 0..LANES {
+            let i = (x[l] + n * (y[l] + n * z[l])) as usize;
+            // Holds anyway; so the compiler knows it too.
+            distances[l] = self.distances[i & (Self::N_MACROCELLS.pow(3) - 1)];
+        }
+        distances
+    }
+
+    /// The macrocells that hold nodes, along each axis.
+    #[inline(always)]
+    fn macrocells(&self, at: &Lanes) -> [[u32; LANES]; 3] {
+        let mut macrocells = [[0; LANES]; 3];
+        for (axis, macrocells) in macrocells.iter_mut().enumerate() {
+            let (cells, _) = self.nodes.cells::<N, LANES>(axis, at);
+            for l in 0..LANES {
+                macrocells[l] = cells[l] / MACROCELL_SIDE;
+            }
+        }
+        macrocells
+    }
+
+    /// The first segment that is not wholly among the dark macrocells around one; the brick's own faces end it anyway.
+    #[inline(always)]
+    fn leaves(&self, macrocell: [u32; 3], distance: u8) -> i32 {
+        let side = MACROCELL_SIDE as f32;
+        let reach = f32::from(distance) - 0.5;
+        let mut exit = f32::MAX;
+        for ((at, origin), change) in macrocell.into_iter().zip(self.nodes.origin).zip(self.nodes.change) {
+            let sign = if change > 0.0 { 1.0 } else { -1.0 };
+            let face = (at as f32 + 0.5 + sign * reach) * side;
+            if change != 0.0 && face > 0.0 && face < N as f32 {
+                exit = at_most(exit, (face - origin) / change);
+            }
+        }
+        ceil(exit - self.far)
+    }
+}
+
+/// Which segments with two nodes may see something: those whose far node is not among the dark macrocells around the near
+/// one. Those are connected, so that the transfer function is 0 between two of their values, too.
+#[inline(always)]
+fn pairs(near: &[[u32; LANES]; 3], far: &[[u32; LANES]; 3], distances: &[u8; LANES]) -> u32 {
+    let mut apart = [0; LANES];
+    for (near, far) in near.iter().zip(far) {
+        for l in 0..LANES {
+            apart[l] = near[l].abs_diff(far[l]).max(apart[l]);
+        }
+    }
+    bits(|l| u32::from(distances[l]) <= apart[l])
+}
+
+/// One bit for each lane.
+#[inline(always)]
+fn bits(is_set: impl Fn(usize) -> bool) -> u32 {
+    let mut bits = 0;
+    for l in 0..LANES {
+        bits |= u32::from(is_set(l)) << l;
+    }
+    bits
+}
+
+/// The least integer not below; at most 2^31 - 128.
+#[inline(always)]
+fn ceil(x: f32) -> i32 {
+    let down = at_most(x, 2_147_483_520.0) as i32;
+    down + i32::from((down as f32) < x)
 }

@@ -1,12 +1,14 @@
 //! Marching one ray.
 
+use std::ops::Range;
+
 use brickfield_core::Span;
 use brickfield_core::glam::DVec3;
 use brickfield_frame::{IndexEntry, PlanRay};
 
 use super::batch;
-use super::brick::{LANES, Lanes, Nodes, Stored};
-use super::detail::Runs;
+use super::brick::{LANES, Nodes, Stored};
+use super::detail::Sieve;
 use super::scene::{Block, Scene};
 use super::segment::{Ray32, Segment32, segment};
 
@@ -35,22 +37,22 @@ impl Path<'_> {
     }
 }
 
-/// The pixel of a ray.
+/// Most segments that are counted from one node: in f32 they are still whole.
+const MOST: i64 = 1 << 23;
+
+/// The pixel of a ray, of which some runs of segments may see something, front to back.
 #[inline(always)]
-pub(super) fn march<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRay) -> [f32; 4] {
+pub(super) fn march<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
     let plan = scene.plan;
     let least = -plan.rays.start;
-    let relative = |b: &brickfield_core::Aabb| (b.min - scene.center, b.max - scene.center);
-    let Some(span) = clip(ray, relative(&plan.domain), least) else { return [0.0; 4] };
-    let Some(visible) = clip(ray, relative(&plan.visible), least) else { return [0.0; 4] };
+    let domain = (plan.domain.min - scene.center, plan.domain.max - scene.center);
+    let Some(span) = clip(ray, domain, least) else { return [0.0; 4] };
     let step = plan.sampling.step_world();
     let (per_unit, reciprocal) = (1.0 / step, ray.direction.recip());
     let (first, end) = (floor(span.start / step), floor(span.end / step) + 1);
     let path = Path { ray, span, step, per_unit, reciprocal, first, end };
-    let from = path.first.max(floor(visible.start / step) - 1);
-    let to = path.end.min(floor(visible.end / step) + 2);
     let mut state = Ray32::default();
-    along(scene, &path, from, to, &mut state);
+    along(scene, &path, runs, &mut state);
     state.rgba()
 }
 
@@ -58,21 +60,23 @@ fn floor(x: f64) -> i64 {
     x.floor() as i64
 }
 
-/// Segments `from..to`, block by block.
+/// The segments of some runs, block by block.
 #[inline(always)]
-fn along<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, from: i64, to: i64, state: &mut Ray32) {
+fn along<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, runs: &[Range<i64>], state: &mut Ray32) {
     let nodes = scene.plan.sampling.rule().nodes();
     let (near, far) = (nodes[0], nodes[nodes.len() - 1]);
     let floor = scene.plan.sampling.transmittance_floor();
-    let mut k = from;
-    while k < to {
-        let n = if path.is_whole(k) { run(scene, path, k, (near, far), to, state) } else { 0 };
-        if n == 0 {
-            state.push(single(scene, path, k));
-        }
-        k += n.max(1);
-        if state.transmittance < floor || state.transmittance == 0.0 {
-            return;
+    for segments in runs {
+        let (mut k, to) = (path.first.max(segments.start), path.end.min(segments.end));
+        while k < to {
+            let n = if path.is_whole(k) { run(scene, path, k, (near, far), to, state) } else { 0 };
+            if n == 0 {
+                state.push(single(scene, path, k));
+            }
+            k += n.max(1);
+            if state.transmittance < floor || state.transmittance == 0.0 {
+                return;
+            }
         }
     }
 }
@@ -99,7 +103,7 @@ fn run<const N: usize, S: Stored>(
     let t = (k as f64 + near) * path.step;
     let block = scene.block(scene.center + path.ray.at(t));
     let exit = exit(scene, path, &block);
-    let n = ((exit * path.per_unit - far).ceil() - k as f64).min((to.min(path.end - 1) - k) as f64) as i64;
+    let n = ((exit * path.per_unit - far).ceil() - k as f64).min((to.min(path.end - 1) - k).min(MOST) as f64) as i32;
     if let (IndexEntry::Resident { slot, level }, true) = (block.entry, n > 0) {
         let scale = 1.0 / f64::from(level.stride());
         let array = |v: DVec3| v.as_vec3().to_array();
@@ -110,22 +114,13 @@ fn run<const N: usize, S: Stored>(
             bias: scene.bias,
         };
         let far = (far - near) as f32;
-        let mut inner = Inner { brick: scene.brick(slot), nodes, far, waiting: [0.0; LANES], n_waiting: 0 };
+        let mut inner = Inner { brick: scene.brick(slot), nodes, far, waiting: [0; 2 * LANES] };
         match &scene.plan.occupancy {
-            Some(occupancy) => {
-                let floor = scene.plan.sampling.transmittance_floor();
-                for (from, to) in Runs::<N>::new(&nodes, far, occupancy.brick(slot), n) {
-                    inner.push(scene, from, to, state);
-                    if state.transmittance < floor {
-                        break;
-                    }
-                }
-            }
-            None => inner.push(scene, 0, n, state),
+            Some(occupancy) => inner.push_visible(scene, &Sieve::<N>::new(nodes, far, occupancy.brick(slot)), n, state),
+            None => inner.push_all(scene, n, state),
         }
-        inner.flush(scene, state);
     }
-    n
+    i64::from(n)
 }
 
 /// Where the ray leaves a block.
@@ -151,46 +146,74 @@ struct Inner<'a> {
     /// Distance between the rule's nodes, in segments.
     far: f32,
     /// Segments that wait.
-    waiting: Lanes,
-    n_waiting: usize,
+    waiting: [i32; 2 * LANES],
 }
 
 impl Inner<'_> {
-    /// Puts segments `from..to` behind what has been seen so far, but for the last ones, which wait.
-    ///
-    /// Segments of several short runs share a batch.
+    /// Segments `0..n`, one after the other.
     #[inline(always)]
-    fn push<const N: usize, S: Stored>(&mut self, scene: &Scene<N, S>, from: i64, to: i64, state: &mut Ray32) {
-        let mut k = from;
-        while k < to {
-            let n = (LANES - self.n_waiting).min((to - k) as usize);
-            for l in 0..n {
-                self.waiting[self.n_waiting + l] = (k + l as i64) as f32;
+    fn push_all<const N: usize, S: Stored>(&mut self, scene: &Scene<N, S>, n: i32, state: &mut Ray32) {
+        for first in (0..n).step_by(LANES) {
+            for (l, k) in self.waiting.iter_mut().enumerate() {
+                *k = first + l as i32;
             }
-            self.n_waiting += n;
-            k += n as i64;
-            if self.n_waiting == LANES {
-                self.flush(scene, state);
-                if state.transmittance < scene.plan.sampling.transmittance_floor() {
-                    return;
-                }
+            self.look(scene, ((n - first) as usize).min(LANES), state);
+            if state.transmittance < scene.plan.sampling.transmittance_floor() {
+                return;
             }
         }
     }
 
-    /// Looks at the segments that wait.
+    /// Those of segments `0..n` that may see something. They wait until they are a batch.
     #[inline(always)]
-    fn flush<const N: usize, S: Stored>(&mut self, scene: &Scene<N, S>, state: &mut Ray32) {
-        let (rule, length) = (scene.plan.sampling.rule(), scene.plan.sampling.step_world() as f32);
-        let n = std::mem::take(&mut self.n_waiting);
-        if n == 0 {
-            return;
+    fn push_visible<const N: usize, S: Stored>(
+        &mut self,
+        scene: &Scene<N, S>,
+        sieve: &Sieve<N>,
+        n: i32,
+        state: &mut Ray32,
+    ) {
+        let mut first = 0;
+        let mut n_waiting = 0;
+        while first < n {
+            let (mut visible, next) = sieve.batch(first);
+            if n - first < LANES as i32 {
+                visible &= (1 << (n - first)) - 1;
+            }
+            while visible != 0 {
+                self.waiting[n_waiting % (2 * LANES)] = first + visible.trailing_zeros() as i32;
+                n_waiting += 1;
+                visible &= visible - 1;
+            }
+            if n_waiting >= LANES {
+                self.look(scene, LANES, state);
+                if state.transmittance < scene.plan.sampling.transmittance_floor() {
+                    return;
+                }
+                n_waiting -= LANES;
+                self.waiting.copy_within(LANES.., 0);
+            }
+            first = next;
         }
-        let near = scene.values(&self.nodes, self.brick, &self.waiting);
+        if n_waiting > 0 {
+            self.look(scene, n_waiting, state);
+        }
+    }
+
+    /// Puts the first `n` segments that wait behind what has been seen so far.
+    #[inline(always)]
+    fn look<const N: usize, S: Stored>(&self, scene: &Scene<N, S>, n: usize, state: &mut Ray32) {
+        let mut at = [0f32; LANES];
+        for (at, k) in at.iter_mut().zip(&self.waiting) {
+            *at = *k as f32;
+        }
+        let (rule, length) = (scene.plan.sampling.rule(), scene.plan.sampling.step_world() as f32);
+        let near = scene.first_values(&self.nodes, self.brick, &at, n);
         match rule.nodes().len() {
-            1 => batch::one_node(rule, &scene.transfer, near, n, length, state),
+            1 => batch::one_node(rule, &scene.transfer, &near, n, length, state),
             _ => {
-                let far = scene.values(&self.nodes, self.brick, &self.waiting.map(|at| at + self.far));
+                at.iter_mut().for_each(|at| *at += self.far);
+                let far = scene.first_values(&self.nodes, self.brick, &at, n);
                 batch::two_nodes(rule, &scene.transfer, (&near, &far), n, length, state);
             }
         }

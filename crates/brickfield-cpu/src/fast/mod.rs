@@ -1,14 +1,17 @@
 //! The fast f32 renderer: a backend that needs no driver.
 
 mod batch;
+mod beam;
 mod brick;
 mod classify;
 mod detail;
 mod march;
+mod overview;
 mod scalar;
 mod scene;
 mod segment;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use brickfield_core::glam::{DVec3, UVec2};
@@ -18,7 +21,9 @@ use brickfield_frame::{
 };
 use rayon::prelude::*;
 
+use beam::Beam;
 use brick::{Float32, Stored, Unorm8, Unorm16};
+use overview::{LastOverview, Overview};
 use scene::Scene;
 
 /// Most pixels along a side of a picture.
@@ -31,12 +36,14 @@ const MAX_IMAGE: u32 = 1 << 16;
 #[derive(Clone, Debug)]
 pub struct CpuBackend {
     description: Description,
+    overview: LastOverview,
 }
 
 impl CpuBackend {
     /// The backend for this machine.
     pub fn new() -> CpuBackend {
         CpuBackend {
+            overview: LastOverview::default(),
             description: Description {
                 backend: "cpu",
                 adapter: cpu_model(),
@@ -75,7 +82,7 @@ impl Backend for CpuBackend {
             return Ok(Frame { image: Image::transparent(plan.size()), timing: Timing::default() });
         }
         let begin = Instant::now();
-        let image = dispatch(plan, Rendering);
+        let image = dispatch(plan, Rendering { overview: self.overview.get(plan) });
         Ok(Frame { image, timing: Timing { wall_ms: milliseconds(begin), ..Timing::default() } })
     }
 
@@ -112,7 +119,9 @@ fn dispatch_side<S: Stored, W: Work>(plan: &FramePlan, work: W) -> W::Output {
     }
 }
 
-struct Rendering;
+struct Rendering {
+    overview: Option<Arc<Overview>>,
+}
 
 impl Work for Rendering {
     type Output = Image<f32>;
@@ -121,8 +130,9 @@ impl Work for Rendering {
         let mut image = Image::transparent(size);
         let width = size.x.max(1) as usize;
         let simd = pulp::Arch::new();
+        let overview = self.overview.as_deref();
         let bands = image.pixels_mut().par_chunks_mut(width * TILE).enumerate();
-        bands.for_each(|(band, pixels)| simd.dispatch(Band { scene, first_row: band * TILE, width, pixels }));
+        bands.for_each(|(band, pixels)| simd.dispatch(Band { scene, overview, first_row: band * TILE, width, pixels }));
         image
     }
 }
@@ -133,6 +143,7 @@ const TILE: usize = 8;
 /// [`TILE`] rows of the picture: all that is inlined below it is compiled once for each instruction set.
 struct Band<'a, const N: usize, S> {
     scene: &'a Scene<'a, N, S>,
+    overview: Option<&'a Overview>,
     first_row: usize,
     width: usize,
     pixels: &'a mut [[f32; 4]],
@@ -143,11 +154,22 @@ impl<const N: usize, S: Stored> pulp::NullaryFnOnce for Band<'_, N, S> {
     #[inline(always)]
     fn call(self) {
         let n_rows = self.pixels.len() / self.width;
+        let plan = self.scene.plan;
+        let rows = self.first_row as u32..(self.first_row + n_rows) as u32;
+        // Without an overview, all segments are one run.
+        let mut runs = Vec::from([i64::MIN..i64::MAX]);
         for tile in (0..self.width).step_by(TILE) {
             let columns = tile..(tile + TILE).min(self.width);
+            if let Some(overview) = self.overview {
+                let beam = Beam::new(&plan.rays, plan.dims, &(columns.start as u32..columns.end as u32), &rows);
+                beam.runs(overview, plan, &mut runs);
+            }
+            if runs.is_empty() {
+                continue;
+            }
             for (y, x) in (0..n_rows).flat_map(|y| columns.clone().map(move |x| (y, x))) {
-                let ray = self.scene.plan.rays.ray(x as u32, (self.first_row + y) as u32);
-                self.pixels[y * self.width + x] = march::march(self.scene, &ray);
+                let ray = plan.rays.ray(x as u32, (self.first_row + y) as u32);
+                self.pixels[y * self.width + x] = march::march(self.scene, &ray, &runs);
             }
         }
     }

@@ -83,13 +83,28 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
         let s = (q.clamp(DVec3::ZERO, self.last) - block.corner) / f64::from(level.stride());
         let nodes =
             Nodes { origin: s.as_vec3().to_array(), change: [0.0; 3], last: [(N - 1) as f32; 3], bias: self.bias };
-        Some(self.values(&nodes, self.brick(slot), &[0.0; LANES])[0])
+        Some(self.values(&nodes, self.brick(slot), &[0.0])[0])
     }
 
     /// The values at nodes `at`, relative to the first knot.
     #[inline(always)]
-    pub(super) fn values(&self, nodes: &Nodes, brick: &[u8], at: &Lanes) -> Lanes {
-        nodes.stored::<N, S>(brick, at).map(|stored| stored * self.gain + self.offset)
+    pub(super) fn values<const L: usize>(&self, nodes: &Nodes, brick: &[u8], at: &[f32; L]) -> [f32; L] {
+        let mut values = nodes.stored::<N, S, L>(brick, at);
+        for value in &mut values {
+            *value = *value * self.gain + self.offset;
+        }
+        values
+    }
+
+    /// The values at the first `n` of some nodes, the last of them in the lanes behind.
+    #[inline(always)]
+    pub(super) fn first_values(&self, nodes: &Nodes, brick: &[u8], at: &Lanes, n: usize) -> Lanes {
+        let mut values = self.values(nodes, brick, at);
+        if n < LANES {
+            let last = values[n - 1];
+            values[n..].fill(last);
+        }
+        values
     }
 
     /// The bytes of the brick in a slot.

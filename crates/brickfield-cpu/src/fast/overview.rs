@@ -1,0 +1,226 @@
+//! Where a whole cut is dark: distances on a lattice over the volume.
+
+use std::sync::{Arc, Weak};
+
+use brickfield_core::glam::{UVec3, Vec3};
+use brickfield_frame::{FramePlan, IndexEntry, IndexGrid, MACROCELL_SIDE, Occupancy, QuadratureRule};
+use rayon::prelude::*;
+
+/// Most cells of a lattice: 128^3.
+const MAX_CELLS: usize = 1 << 21;
+/// Cells that a distance can tell; farther ones are as if that far away.
+const FARTHEST: u8 = 32;
+
+/// A lattice over the volume: the macrocells of bricks of level 0, or 2^m of them along each axis where those are too many.
+///
+/// Each cell has its Chebyshev distance, in cells, to the nearest that may show something, whatever brick that is in.
+#[derive(Clone, Debug)]
+pub(super) struct Overview {
+    n_cells: UVec3,
+    distances: Vec<u8>,
+    /// Where cells begin along each axis, in sample space; one more than there are cells.
+    edges: [Vec<f32>; 3],
+    lattice: Lattice,
+}
+
+/// How positions become cells, along any axis.
+#[derive(Clone, Copy, Debug)]
+struct Lattice {
+    /// Samples from brick to brick.
+    n_brick: u32,
+    /// Macrocells from brick to brick.
+    n_macrocells: u32,
+    /// The power of two of macrocells that are a cell.
+    shift: u32,
+}
+
+impl Lattice {
+    /// The cell of a sample position that is not negative.
+    #[inline(always)]
+    fn cell(&self, sample: u32) -> u32 {
+        let brick = sample / self.n_brick;
+        (brick * self.n_macrocells + (sample - brick * self.n_brick) / MACROCELL_SIDE) >> self.shift
+    }
+
+    /// Where a cell begins.
+    fn edge(&self, cell: u32) -> u32 {
+        let macrocell = cell << self.shift;
+        macrocell / self.n_macrocells * self.n_brick + macrocell % self.n_macrocells * MACROCELL_SIDE
+    }
+}
+
+/// The overview of the last plan, kept for the next one.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LastOverview {
+    overview: Option<Arc<Overview>>,
+    index: Option<IndexGrid>,
+    occupancy: Weak<Occupancy>,
+}
+
+impl LastOverview {
+    /// The overview of a plan; `None` where rays find their own way.
+    pub(super) fn get(&mut self, plan: &FramePlan) -> Option<Arc<Overview>> {
+        // Between levels, what is dark need not be connected: a pre-integrated segment could cross something visible.
+        if plan.sampling.rule() == QuadratureRule::PreIntegrated && has_levels(&plan.index) {
+            return None;
+        }
+        let occupancy = plan.occupancy.as_ref().map_or_else(Weak::new, Arc::downgrade);
+        if self.index.as_ref() != Some(&plan.index) || !self.occupancy.ptr_eq(&occupancy) {
+            let overview = Overview::of(plan).map(Arc::new);
+            *self = LastOverview { overview, index: Some(plan.index.clone()), occupancy };
+        }
+        self.overview.clone()
+    }
+}
+
+fn is_transparent(word: &u32) -> bool {
+    matches!(IndexEntry::unpack(*word), IndexEntry::Transparent { .. })
+}
+
+/// Whether bricks of several levels are resident.
+fn has_levels(index: &IndexGrid) -> bool {
+    let mut levels = index.words().iter().filter(|w| !is_transparent(w)).map(|w| IndexEntry::unpack(*w).level());
+    levels.next().is_some_and(|first| levels.any(|level| level != first))
+}
+
+/// A box of positions.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Region {
+    pub(super) low: Vec3,
+    pub(super) high: Vec3,
+}
+
+impl Overview {
+    /// The overview of a plan; `None` if nothing in it is known to be dark.
+    fn of(plan: &FramePlan) -> Option<Overview> {
+        if plan.occupancy.is_none() && !plan.index.words().iter().any(is_transparent) {
+            return None;
+        }
+        let side = plan.bricks.side();
+        let mut lattice = Lattice { n_brick: side.n_cells(), n_macrocells: Occupancy::n_macrocells(side), shift: 0 };
+        let n_macrocells = plan.index.dims() * lattice.n_macrocells;
+        let n_cells = |shift: u32| (n_macrocells + ((1 << shift) - 1)) >> shift;
+        let total = |n: UVec3| n.to_array().into_iter().map(|n| n as usize).product::<usize>();
+        while total(n_cells(lattice.shift)) > MAX_CELLS {
+            lattice.shift += 1;
+        }
+        let n_cells = n_cells(lattice.shift);
+        let edges = n_cells.to_array().map(|n| edges(&lattice, n));
+        let mut overview = Overview { n_cells, distances: vec![FARTHEST; total(n_cells)], edges, lattice };
+        overview.mark(plan);
+        overview.spread();
+        Some(overview)
+    }
+
+    /// Sets what may show something to 0.
+    fn mark(&mut self, plan: &FramePlan) {
+        let dims = plan.index.dims();
+        for z in 0..dims.z {
+            for y in 0..dims.y {
+                for x in 0..dims.x {
+                    let cell = UVec3::new(x, y, z);
+                    let IndexEntry::Resident { slot, level } = plan.index.at(cell) else { continue };
+                    // A coarse brick is marked once, from its lower corner.
+                    if cell & (level.stride() - 1) == UVec3::ZERO {
+                        self.mark_brick(plan.occupancy.as_deref(), cell, slot, level.stride());
+                    }
+                }
+            }
+        }
+    }
+
+    fn mark_brick(&mut self, occupancy: Option<&Occupancy>, cell: UVec3, slot: u32, stride: u32) {
+        let corner = cell * self.lattice.n_brick;
+        let Some(occupancy) = occupancy else {
+            return self.mark_box(corner, corner + self.lattice.n_brick * stride);
+        };
+        let n = self.lattice.n_macrocells;
+        for (i, _) in occupancy.brick(slot).iter().enumerate().filter(|(_, d)| **d == 0) {
+            let i = i as u32;
+            let at = UVec3::new(i % n, i / n % n, i / n / n);
+            let low = at * MACROCELL_SIDE;
+            let high = (low + MACROCELL_SIDE).min(UVec3::splat(self.lattice.n_brick));
+            self.mark_box(corner + low * stride, corner + high * stride);
+        }
+    }
+
+    /// Marks what overlaps the samples from `low` to `high`, as far as the lattice reaches.
+    fn mark_box(&mut self, low: UVec3, high: UVec3) {
+        let cell = |v: UVec3| UVec3::from(v.to_array().map(|s| self.lattice.cell(s)));
+        let high = (cell(high - 1) + 1).min(self.n_cells);
+        let low = cell(low).min(high);
+        for z in low.z..high.z {
+            for y in low.y..high.y {
+                let row = ((z * self.n_cells.y + y) * self.n_cells.x) as usize;
+                self.distances[row + low.x as usize..row + high.x as usize].fill(0);
+            }
+        }
+    }
+
+    /// From 0 (may show) and `FARTHEST` to distances: along x, then the greater of what that found and the way along y, then z.
+    fn spread(&mut self) {
+        let [nx, ny, nz] = self.n_cells.to_array().map(|n| n as usize);
+        self.distances.par_chunks_mut(nx).for_each(along_row);
+        for (stride, n) in [(1, ny), (ny, nz)] {
+            let before = self.distances.clone();
+            self.distances.par_chunks_mut(nx).enumerate().for_each(|(row, out)| {
+                let at = row / stride % n;
+                let of = |other: usize| &before[(row + other * stride - at * stride) * nx..][..nx];
+                for way in 1..usize::from(FARTHEST) {
+                    if way <= at {
+                        nearer(out, of(at - way), way as u8);
+                    }
+                    if at + way < n {
+                        nearer(out, of(at + way), way as u8);
+                    }
+                }
+            });
+        }
+    }
+
+    /// World units in which a position that moves this many samples per unit passes a cell.
+    pub(super) fn pace(&self, change: f32) -> f32 {
+        (MACROCELL_SIDE << self.lattice.shift) as f32 / change
+    }
+
+    /// All dark cells around the cell that holds `p`, as a box; `None` if that cell may show something.
+    #[inline(always)]
+    pub(super) fn dark_around(&self, p: Vec3) -> Option<Region> {
+        let top = self.n_cells - 1;
+        let sample = p.max(Vec3::ZERO).as_uvec3();
+        let cell = UVec3::from(sample.to_array().map(|s| self.lattice.cell(s))).min(top);
+        let i = cell.x + self.n_cells.x * (cell.y + self.n_cells.y * cell.z);
+        let d = u32::from(self.distances[i as usize]);
+        if d == 0 {
+            return None;
+        }
+        let (mut low, mut high) = (Vec3::ZERO, Vec3::ZERO);
+        for axis in 0..3 {
+            let c = cell[axis];
+            low[axis] = if c < d { f32::NEG_INFINITY } else { self.edges[axis][(c + 1 - d) as usize] };
+            high[axis] = if c + d > top[axis] { f32::INFINITY } else { self.edges[axis][(c + d) as usize] };
+        }
+        Some(Region { low, high })
+    }
+}
+
+fn edges(lattice: &Lattice, n: u32) -> Vec<f32> {
+    (0..=n).map(|cell| lattice.edge(cell) as f32).collect()
+}
+
+/// Distances along a row of 0 (may show) and `FARTHEST`.
+fn along_row(row: &mut [u8]) {
+    let closer = |last: &mut u8, d: &mut u8| {
+        *d = (*d).min(*last + 1).min(FARTHEST);
+        *last = *d;
+    };
+    let mut last = FARTHEST;
+    row.iter_mut().for_each(|d| closer(&mut last, d));
+    last = FARTHEST;
+    row.iter_mut().rev().for_each(|d| closer(&mut last, d));
+}
+
+/// What a row `way` rows away says of this one.
+fn nearer(out: &mut [u8], other: &[u8], way: u8) {
+    out.iter_mut().zip(other).for_each(|(d, o)| *d = (*d).min((*o).max(way)));
+}
