@@ -156,8 +156,10 @@ impl<const N: usize, S: Stored> pulp::NullaryFnOnce for Band<'_, N, S> {
         let n_rows = self.pixels.len() / self.width;
         let plan = self.scene.plan;
         let rows = self.first_row as u32..(self.first_row + n_rows) as u32;
-        // Without an overview, all segments are one run.
-        let mut runs = Vec::from([i64::MIN..i64::MAX]);
+        let mut runs = Vec::new();
+        if self.overview.is_none() {
+            runs.push(i64::MIN..i64::MAX);
+        }
         for tile in (0..self.width).step_by(TILE) {
             let columns = tile..(tile + TILE).min(self.width);
             if let Some(overview) = self.overview {
