@@ -24,6 +24,7 @@ pub(crate) struct Scene {
     seen_before: Slot,
     /// And the map that is in it.
     occupancy: (Slot, Weak<Occupancy>),
+    beams: Slot,
 }
 
 /// A buffer that grows when it must, and how much of it is used.
@@ -46,6 +47,7 @@ impl Scene {
             knots: Slot::new("the transfer function", vk::BufferUsageFlags::STORAGE_BUFFER),
             seen_before: Slot::new("rays between passes", vk::BufferUsageFlags::STORAGE_BUFFER),
             occupancy: (Slot::new("the occupancy of bricks", vk::BufferUsageFlags::STORAGE_BUFFER), Weak::new()),
+            beams: Slot::new("the beams", vk::BufferUsageFlags::STORAGE_BUFFER),
         })
     }
 
@@ -70,10 +72,16 @@ impl Scene {
             copies.push((slot.reserve(&self.device, bytes.len())?, bytes));
         }
         staging.fill(queue, &copies)?;
+        let missing =
+            |what: &str| RenderError::Shader { message: format!("it reads {what} that the plan does not have") };
         if pipeline.binds(9) {
-            let missing =
-                || RenderError::Shader { message: "it reads an occupancy that the plan does not have".into() };
-            self.hold_occupancy(queue, staging, plan.occupancy.as_ref().ok_or_else(missing)?)?;
+            let occupancy = plan.occupancy.as_ref().ok_or_else(|| missing("an occupancy"))?;
+            self.hold_occupancy(queue, staging, occupancy)?;
+        }
+        if pipeline.binds(10) {
+            let spans = plan.beams.as_ref().ok_or_else(|| missing("beams"))?.spans();
+            let bytes = bytemuck::cast_slice(&spans);
+            staging.fill(queue, &[(self.beams.reserve(&self.device, bytes.len())?, bytes)])?;
         }
         Ok(uniforms)
     }
@@ -115,6 +123,7 @@ impl Scene {
             4 => self.knots.resource(),
             8 => self.seen_before.resource(),
             9 => self.occupancy.0.resource(),
+            10 => self.beams.resource(),
             _ => None,
         }
     }

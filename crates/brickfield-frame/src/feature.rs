@@ -12,6 +12,8 @@ pub enum Feature {
     SkipTransparent,
     /// Some macrocells of resident bricks are dark: rays leap over them.
     SkipMacrocells,
+    /// Tiles of the picture have beams: rays leave out what these pass over.
+    SkipBesideBeams,
     /// The cut has bricks of several levels.
     MultiLevel,
     /// The transfer function has several knots, and needs a lookup.
@@ -20,11 +22,12 @@ pub enum Feature {
 
 impl Feature {
     /// All features.
-    pub const ALL: [Feature; 6] = [
+    pub const ALL: [Feature; 7] = [
         Feature::HardwareFilter,
         Feature::EarlyTermination,
         Feature::SkipTransparent,
         Feature::SkipMacrocells,
+        Feature::SkipBesideBeams,
         Feature::MultiLevel,
         Feature::TransferLookup,
     ];
@@ -36,6 +39,7 @@ impl Feature {
             Feature::EarlyTermination => "early_termination",
             Feature::SkipTransparent => "skip_transparent",
             Feature::SkipMacrocells => "skip_macrocells",
+            Feature::SkipBesideBeams => "skip_beside_beams",
             Feature::MultiLevel => "multi_level",
             Feature::TransferLookup => "transfer_lookup",
         }

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod backend;
+mod beams;
 mod brick_set;
 mod feature;
 mod index;
@@ -12,6 +13,7 @@ mod rays;
 mod uniform;
 
 pub use backend::{Backend, Capabilities, Description, Frame, RenderError, ShaderFunction, Timing};
+pub use beams::{Beams, Overview};
 pub use brick_set::{AtlasShape, BrickSet, BrickSetError, Decode, SampleFormat};
 pub use brickfield_optics::QuadratureRule;
 pub use feature::{Feature, FeatureSet};

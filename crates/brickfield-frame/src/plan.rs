@@ -6,7 +6,7 @@ use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, TransferFunction};
 use brickfield_optics::QuadratureRule;
 
-use crate::{BrickSet, Feature, FeatureSet, IndexGrid, Occupancy, RayFrame, SampleFormat};
+use crate::{Beams, BrickSet, Feature, FeatureSet, IndexGrid, Occupancy, RayFrame, SampleFormat};
 
 /// Everything that a backend needs for one frame, and nothing that this frame does not need.
 #[derive(Clone, Debug)]
@@ -29,6 +29,8 @@ pub struct FramePlan {
     pub bricks: Arc<BrickSet>,
     /// Which macrocells of those bricks are dark; `None` where nothing inside a brick is leapt over.
     pub occupancy: Option<Arc<Occupancy>>,
+    /// Where the rays of each tile may see something; `None` where each finds its own way.
+    pub beams: Option<Arc<Beams>>,
     /// What the frame needs of a shader.
     pub features: FeatureSet,
 }

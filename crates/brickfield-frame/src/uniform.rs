@@ -41,7 +41,7 @@ pub struct FrameUniforms {
     pub index_dims: [u32; 4],
     /// Bricks of the atlas along x, y, z; w: samples along a brick's side.
     pub atlas_bricks: [u32; 4],
-    /// Width and height of the picture; z: first row of the pass; w: reserved.
+    /// Width and height of the picture; z: first row of the pass; w: pixels along a beam's tile (1 without beams).
     pub size: [u32; 4],
 }
 
@@ -79,7 +79,7 @@ impl FrameUniforms {
             last_sample: float4(relative(plan.last_sample()), samples.counted_from),
             index_dims: uint4(plan.index.dims(), plan.transfer.knots().len() as u32),
             atlas_bricks: uint4(atlas.bricks, plan.bricks.side().n_samples()),
-            size: [rays.size.x, rays.size.y, 0, 0],
+            size: [rays.size.x, rays.size.y, 0, plan.beams.as_ref().map_or(1, |b| b.tile_side())],
         }
         .in_pass(&whole)
     }

@@ -41,6 +41,7 @@ struct Scene {
     seen_before: Reused,
     /// And the map that is in it.
     occupancy: (Reused, Weak<Occupancy>),
+    beams: Reused,
     inputs: Reused,
     results: Reused,
     sampler: wgpu::Sampler,
@@ -186,6 +187,7 @@ impl Scene {
             knots: Reused::new("the transfer function", storage),
             seen_before: Reused::new("rays between passes", storage),
             occupancy: (Reused::new("the occupancy of bricks", storage), Weak::new()),
+            beams: Reused::new("the beams", storage),
             inputs: Reused::new("the inputs", storage),
             results: Reused::new("the results", BufferUsages::STORAGE | BufferUsages::COPY_SRC),
             sampler: device.device.create_sampler(&wgpu::SamplerDescriptor {
@@ -218,6 +220,10 @@ impl Scene {
         }
         if pipeline.binds(9) {
             self.hold_occupancy(device, plan)?;
+        }
+        if pipeline.binds(10) {
+            let beams = plan.beams.as_ref().ok_or_else(unbound)?;
+            self.beams.write(device, bytemuck::cast_slice(&beams.spans()))?;
         }
         Ok(uniforms)
     }
@@ -265,6 +271,7 @@ impl Scene {
             7 => self.results.binding(),
             8 => self.seen_before.binding(),
             9 => self.occupancy.0.binding(),
+            10 => self.beams.binding(),
             _ => None,
         }
     }

@@ -100,8 +100,9 @@ fn skipping_changes_no_bit() {
 #[test]
 fn every_variant_renders_what_the_general_one_renders() {
     let Some(mut backend) = backend() else { return };
-    let unneeded = [Feature::HardwareFilter, Feature::EarlyTermination, Feature::SkipMacrocells];
-    let general = unneeded.into_iter().fold(FeatureSet::all(), FeatureSet::without);
+    let of_maps = [Feature::SkipMacrocells, Feature::SkipBesideBeams];
+    let unneeded = [Feature::HardwareFilter, Feature::EarlyTermination].into_iter().chain(of_maps);
+    let general = unneeded.fold(FeatureSet::all(), FeatureSet::without);
     for rule in QuadratureRule::ALL {
         for plan in [Scene::new(DIMS, ball, warm()), Scene { skip: true, ..Scene::new(DIMS, ball, warm()) }]
             .map(|scene| Scene { rule, ..scene }.plan())

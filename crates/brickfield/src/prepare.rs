@@ -1,10 +1,12 @@
 //! From a scene to a frame plan.
 
+use std::sync::Arc;
+
 use brickfield_bricks::BrickTree;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BrickId, Level};
 use brickfield_frame::{
-    Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, RayFrame, Sampling, SamplingError,
+    Beams, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, RayFrame, Sampling, SamplingError,
 };
 use brickfield_lod::{Culling, Selection, View, select_cut};
 use brickfield_optics::QuadratureRule;
@@ -65,8 +67,11 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
         Skipping::On => residency.occupancy(&scene.transfer),
         Skipping::Off => None,
     };
-    let features = features(scene, &index, levels_differ, occupancy.is_some());
-    Ok(FramePlan {
+    let overview = match scene.skipping {
+        Skipping::On => residency.overview(&index, occupancy.as_ref()),
+        Skipping::Off => None,
+    };
+    let mut plan = FramePlan {
         dims: grid.dims(),
         rays: RayFrame::new(&scene.camera, grid, scene.size, &volume_box(tree), step_world),
         domain,
@@ -76,8 +81,12 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
         index,
         bricks,
         occupancy,
-        features,
-    })
+        beams: None,
+        features: FeatureSet::default(),
+    };
+    plan.beams = overview.and_then(|overview| Beams::of(&plan, &overview)).map(Arc::new);
+    plan.features = features(&plan, levels_differ);
+    Ok(plan)
 }
 
 /// Without skipping, bricks outside the view are kept, too.
@@ -196,18 +205,18 @@ fn visible_box(tree: &BrickTree, resident: &[BrickId], domain: &Aabb) -> Aabb {
     if visible.is_empty() { empty } else { visible }
 }
 
-fn features(scene: &Scene, index: &IndexGrid, levels_differ: bool, any_dark: bool) -> FeatureSet {
+fn features(plan: &FramePlan, levels_differ: bool) -> FeatureSet {
     let any_transparent =
-        index.words().iter().any(|w| matches!(IndexEntry::unpack(*w), IndexEntry::Transparent { .. }));
-    let fast = matches!(scene.mode, Mode::Fast { .. });
-    let ends_early = matches!(scene.mode, Mode::Fast { transmittance_floor } if transmittance_floor > 0.0);
+        plan.index.words().iter().any(|w| matches!(IndexEntry::unpack(*w), IndexEntry::Transparent { .. }));
+    let fast = matches!(plan.sampling.mode(), Mode::Fast { .. });
     let needed = [
         (Feature::HardwareFilter, fast),
-        (Feature::EarlyTermination, ends_early),
+        (Feature::EarlyTermination, plan.sampling.transmittance_floor() > 0.0),
         (Feature::SkipTransparent, any_transparent),
-        (Feature::SkipMacrocells, any_dark),
+        (Feature::SkipMacrocells, plan.occupancy.is_some()),
+        (Feature::SkipBesideBeams, plan.beams.is_some()),
         (Feature::MultiLevel, levels_differ),
-        (Feature::TransferLookup, scene.transfer.knots().len() > 1),
+        (Feature::TransferLookup, plan.transfer.knots().len() > 1),
     ];
     needed.into_iter().filter(|(_, need)| *need).map(|(feature, _)| feature).collect()
 }

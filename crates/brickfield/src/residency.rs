@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use brickfield_bricks::{BrickSamples, BrickTree, with_brick_samples};
 use brickfield_core::{BrickId, Scalar, ScalarType, TransferFunction};
-use brickfield_frame::{BrickSet, Decode, MacrocellRanges, Occupancy};
+use brickfield_frame::{BrickSet, Decode, IndexGrid, MacrocellRanges, Occupancy, Overview};
 use rayon::prelude::*;
 
 /// The brick set of the last frame. A frame that needs the same bricks gets the same set, and backends upload nothing.
@@ -15,6 +15,8 @@ pub struct Residency {
     /// Of the set, once a frame asked for it.
     ranges: Option<MacrocellRanges>,
     occupancy: Option<(TransferFunction, Option<Arc<Occupancy>>)>,
+    /// Of the last index and occupancy.
+    overview: Option<(IndexGrid, Option<Arc<Occupancy>>, Option<Arc<Overview>>)>,
 }
 
 impl Residency {
@@ -29,7 +31,8 @@ impl Residency {
             Some(set) if self.bricks == bricks => Arc::clone(set),
             _ => {
                 let set = Arc::new(gather(tree, &bricks));
-                *self = Residency { bricks, set: Some(Arc::clone(&set)), ranges: None, occupancy: None };
+                *self =
+                    Residency { bricks, set: Some(Arc::clone(&set)), ranges: None, occupancy: None, overview: None };
                 set
             }
         }
@@ -44,6 +47,23 @@ impl Residency {
                 let occupancy = self.ranges.get_or_insert_with(|| MacrocellRanges::of(set)).occupancy(transfer);
                 self.occupancy = Some((transfer.clone(), occupancy.clone()));
                 occupancy
+            }
+        }
+    }
+
+    /// The overview of an index of the held set; `None` if nothing in it is known to be dark.
+    pub(crate) fn overview(&mut self, index: &IndexGrid, occupancy: Option<&Arc<Occupancy>>) -> Option<Arc<Overview>> {
+        let same = |held: &Option<Arc<Occupancy>>| match (held, occupancy) {
+            (Some(held), Some(occupancy)) => Arc::ptr_eq(held, occupancy),
+            (held, occupancy) => held.is_none() && occupancy.is_none(),
+        };
+        match &self.overview {
+            Some((of, held, overview)) if of == index && same(held) => overview.clone(),
+            _ => {
+                let side = self.set.as_ref()?.side();
+                let overview = Overview::of(side, index, occupancy.map(Arc::as_ref)).map(Arc::new);
+                self.overview = Some((index.clone(), occupancy.cloned(), overview.clone()));
+                overview
             }
         }
     }

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use brickfield::frame::{BrickSet, Decode, Feature, FramePlan, IndexEntry, Mode, SampleFormat, Sampling};
+use brickfield::frame::{
+    Beams, BrickSet, Decode, Feature, FramePlan, IndexEntry, Mode, Overview, SampleFormat, Sampling,
+};
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, Knot, Level, TransferFunction};
 use brickfield_optics::QuadratureRule;
@@ -142,46 +144,62 @@ impl PlanMutant {
     /// The plan with this thing wrong.
     pub fn apply(self, honest: &FramePlan) -> FramePlan {
         let mut plan = honest.clone();
-        match self {
-            PlanMutant::AnchorHalfVoxel => plan.rays.anchor[0].x += 0.5,
-            PlanMutant::PixelCorner => shift_half_pixel(&mut plan),
-            PlanMutant::RowsFlipped => flip_rows(&mut plan),
-            PlanMutant::StepScaled => resample(&mut plan, |s| (s.step_world() * 1.05, s.rule(), s.mode())),
-            PlanMutant::PhaseHalfStep => plan.rays.anchor_past_start += 0.5 * plan.sampling.step_world(),
-            PlanMutant::NotNormalised => plan.rays.pixel = 0.0,
-            PlanMutant::Parallel => make_parallel(&mut plan),
-            PlanMutant::LeftRule => {
-                resample(&mut plan, |s| (s.step_world(), QuadratureRule::LeftExponential, s.mode()));
-            }
-            PlanMutant::DomainAtSamples => end_domain_at_samples(&mut plan),
-            PlanMutant::LastSegmentDropped => drop_last_segment(&mut plan),
-            PlanMutant::VisibleTooSmall => shrink_visible(&mut plan),
-            PlanMutant::BrickTransparent => hide_central_brick(&mut plan),
-            PlanMutant::IndexSwapped => swap_slots(&mut plan),
-            PlanMutant::WrongLevel => confuse_levels(&mut plan),
-            PlanMutant::BricksShifted => move_samples(&mut plan, |p, n| p.with_x((p.x + 1).min(n - 1))),
-            PlanMutant::BorderNotShared => move_samples(&mut plan, |p, n| p.min(UVec3::splat(n - 2))),
-            PlanMutant::BricksTransposed => move_samples(&mut plan, |p, _| UVec3::new(p.y, p.x, p.z)),
-            PlanMutant::BytesSwapped => edit_bytes(&mut plan, |sample| sample.reverse()),
-            PlanMutant::SignTurned => edit_bytes(&mut plan, |sample| sample[sample.len() - 1] ^= 0x80),
-            PlanMutant::DecodeOffset => redecode(&mut plan, |d, range| Decode { offset: d.offset + 0.01 * range, ..d }),
-            PlanMutant::DecodeScale => redecode(&mut plan, |d, _| Decode { scale: d.scale * 256.0 / 255.0, ..d }),
-            PlanMutant::LastSampleCut => plan.dims = (plan.dims - 1).max(UVec3::ONE),
-            PlanMutant::KnotMoved => move_knot(&mut plan),
-            PlanMutant::ExtinctionScaled => edit_knots(&mut plan, |k| k.extinction *= 1.02),
-            PlanMutant::RedBlueSwapped => edit_knots(&mut plan, |k| k.color.swap(0, 2)),
-            PlanMutant::EndsEarly => {
-                resample(&mut plan, |s| (s.step_world(), s.rule(), Mode::Fast { transmittance_floor: 0.25 }));
-                plan.features = plan.features.with(Feature::EarlyTermination);
-            }
-            PlanMutant::BehindTheEye => see_behind(&mut plan),
-            PlanMutant::ClipIgnored => {
-                plan.domain = whole(&plan);
-                plan.visible = plan.domain;
-            }
-            PlanMutant::GhostBricks => show_ghosts(&mut plan),
+        self.spoil(&mut plan);
+        if plan.beams.is_some() {
+            trace_beams(&mut plan);
         }
         plan
+    }
+
+    fn spoil(self, plan: &mut FramePlan) {
+        match self {
+            PlanMutant::AnchorHalfVoxel => plan.rays.anchor[0].x += 0.5,
+            PlanMutant::PixelCorner => shift_half_pixel(plan),
+            PlanMutant::RowsFlipped => flip_rows(plan),
+            PlanMutant::StepScaled => resample(plan, |s| (s.step_world() * 1.05, s.rule(), s.mode())),
+            PlanMutant::PhaseHalfStep => plan.rays.anchor_past_start += 0.5 * plan.sampling.step_world(),
+            PlanMutant::NotNormalised => plan.rays.pixel = 0.0,
+            PlanMutant::Parallel => make_parallel(plan),
+            PlanMutant::LeftRule => {
+                resample(plan, |s| (s.step_world(), QuadratureRule::LeftExponential, s.mode()));
+            }
+            PlanMutant::DomainAtSamples => end_domain_at_samples(plan),
+            PlanMutant::LastSegmentDropped => drop_last_segment(plan),
+            PlanMutant::VisibleTooSmall => shrink_visible(plan),
+            PlanMutant::BrickTransparent => hide_central_brick(plan),
+            PlanMutant::IndexSwapped => swap_slots(plan),
+            PlanMutant::WrongLevel => confuse_levels(plan),
+            PlanMutant::BricksShifted => move_samples(plan, |p, n| p.with_x((p.x + 1).min(n - 1))),
+            PlanMutant::BorderNotShared => move_samples(plan, |p, n| p.min(UVec3::splat(n - 2))),
+            PlanMutant::BricksTransposed => move_samples(plan, |p, _| UVec3::new(p.y, p.x, p.z)),
+            PlanMutant::BytesSwapped => edit_bytes(plan, |sample| sample.reverse()),
+            PlanMutant::SignTurned => edit_bytes(plan, |sample| sample[sample.len() - 1] ^= 0x80),
+            PlanMutant::DecodeOffset => redecode(plan, |d, range| Decode { offset: d.offset + 0.01 * range, ..d }),
+            PlanMutant::DecodeScale => redecode(plan, |d, _| Decode { scale: d.scale * 256.0 / 255.0, ..d }),
+            PlanMutant::LastSampleCut => plan.dims = (plan.dims - 1).max(UVec3::ONE),
+            PlanMutant::KnotMoved => move_knot(plan),
+            PlanMutant::ExtinctionScaled => edit_knots(plan, |k| k.extinction *= 1.02),
+            PlanMutant::RedBlueSwapped => edit_knots(plan, |k| k.color.swap(0, 2)),
+            PlanMutant::EndsEarly => {
+                resample(plan, |s| (s.step_world(), s.rule(), Mode::Fast { transmittance_floor: 0.25 }));
+                plan.features = plan.features.with(Feature::EarlyTermination);
+            }
+            PlanMutant::BehindTheEye => see_behind(plan),
+            PlanMutant::ClipIgnored => {
+                plan.domain = whole(plan);
+                plan.visible = plan.domain;
+            }
+            PlanMutant::GhostBricks => show_ghosts(plan),
+        }
+    }
+}
+
+/// Beams are traced anew: what is wrong shall be seen, not hidden by beams that know better.
+fn trace_beams(plan: &mut FramePlan) {
+    let overview = Overview::of(plan.bricks.side(), &plan.index, plan.occupancy.as_deref());
+    plan.beams = overview.and_then(|overview| Beams::of(plan, &overview)).map(Arc::new);
+    if plan.beams.is_none() {
+        plan.features = plan.features.without(Feature::SkipBesideBeams);
     }
 }
 

@@ -107,6 +107,11 @@ mutants! {
     /// Macrocells are taken for those of the next row.
     MACROCELL_ROW: "macrocell-row", "bricks", "at.x + n * (at.y + n * (at.z + n * block.slot))"
         => "at.y + n * (at.x + n * (at.z + n * block.slot))";
+    /// Beams are taken for those of the tiles mirrored at the diagonal.
+    BEAM_MIRRORED: "beam-mirrored", "march", "beams[tile.x + tile.y * n_columns]" => "beams[tile.y + tile.x * n_columns]";
+    /// Rays end where their beam has come half its way.
+    BEAM_HALVED: "beam-halved", "march", "walk.end = min(walk.end, beam.y);"
+        => "walk.end = min(walk.end, 0.5 * (beam.x + beam.y));";
     /// What earlier passes saw of a ray is forgotten.
     PASS_FORGETS: "pass-forgets", "march", "before = seen_before[slot];" => "before = vec4f(0.0);";
     /// A pass begins at the ray's first segment.

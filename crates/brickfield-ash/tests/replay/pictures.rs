@@ -29,8 +29,9 @@ fn a_homogeneous_slab_has_its_closed_form_in_every_rule() {
     let transfer = TransferFunction::constant(0.07, [0.2, 0.4, 0.8]).unwrap();
     for rule in QuadratureRule::ALL.into_iter().filter(|r| *r != QuadratureRule::LeftRiemann) {
         let mut plan = plan(ramp(SampleFormat::Unorm8), transfer.clone(), rule, Mode::Exact);
-        // No macrocell is dark here, and the plan has no map of them.
-        let general = FeatureSet::all().without(Feature::HardwareFilter).without(Feature::SkipMacrocells);
+        // Nothing is dark here, and the plan has neither a map of macrocells nor beams.
+        let unneeded = [Feature::HardwareFilter, Feature::SkipMacrocells, Feature::SkipBesideBeams];
+        let general = unneeded.into_iter().fold(FeatureSet::all(), FeatureSet::without);
         for features in [plan.features, general] {
             plan.features = features;
             let frame = backend.render(&plan).unwrap();

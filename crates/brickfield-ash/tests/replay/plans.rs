@@ -73,6 +73,7 @@ pub(crate) fn plan(bricks: BrickSet, transfer: TransferFunction, rule: Quadratur
         index,
         bricks: Arc::new(bricks),
         occupancy: None,
+        beams: None,
         features,
     }
 }

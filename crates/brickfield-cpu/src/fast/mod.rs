@@ -1,17 +1,14 @@
 //! The fast f32 renderer: a backend that needs no driver.
 
 mod batch;
-mod beam;
 mod brick;
 mod classify;
 mod detail;
 mod march;
-mod overview;
 mod scalar;
 mod scene;
 mod segment;
 
-use std::sync::Arc;
 use std::time::Instant;
 
 use brickfield_core::glam::{DVec3, UVec2};
@@ -21,9 +18,7 @@ use brickfield_frame::{
 };
 use rayon::prelude::*;
 
-use beam::Beam;
 use brick::{Float32, Stored, Unorm8, Unorm16};
-use overview::{LastOverview, Overview};
 use scene::Scene;
 
 /// Most pixels along a side of a picture.
@@ -36,14 +31,12 @@ const MAX_IMAGE: u32 = 1 << 16;
 #[derive(Clone, Debug)]
 pub struct CpuBackend {
     description: Description,
-    overview: LastOverview,
 }
 
 impl CpuBackend {
     /// The backend for this machine.
     pub fn new() -> CpuBackend {
         CpuBackend {
-            overview: LastOverview::default(),
             description: Description {
                 backend: "cpu",
                 adapter: cpu_model(),
@@ -82,7 +75,7 @@ impl Backend for CpuBackend {
             return Ok(Frame { image: Image::transparent(plan.size()), timing: Timing::default() });
         }
         let begin = Instant::now();
-        let image = dispatch(plan, Rendering { overview: self.overview.get(plan) });
+        let image = dispatch(plan, Rendering);
         Ok(Frame { image, timing: Timing { wall_ms: milliseconds(begin), ..Timing::default() } })
     }
 
@@ -119,9 +112,7 @@ fn dispatch_side<S: Stored, W: Work>(plan: &FramePlan, work: W) -> W::Output {
     }
 }
 
-struct Rendering {
-    overview: Option<Arc<Overview>>,
-}
+struct Rendering;
 
 impl Work for Rendering {
     type Output = Image<f32>;
@@ -130,20 +121,20 @@ impl Work for Rendering {
         let mut image = Image::transparent(size);
         let width = size.x.max(1) as usize;
         let simd = pulp::Arch::new();
-        let overview = self.overview.as_deref();
         let bands = image.pixels_mut().par_chunks_mut(width * TILE).enumerate();
-        bands.for_each(|(band, pixels)| simd.dispatch(Band { scene, overview, first_row: band * TILE, width, pixels }));
+        bands.for_each(|(band, pixels)| simd.dispatch(Band { scene, first_row: band * TILE, width, pixels }));
         image
     }
 }
 
-/// Pixels along a tile's side: neighbouring rays read the same samples while they are in the cache.
+/// Pixels along a tile's side: neighbouring rays read the same samples while they are in the cache. Beams have no smaller ones.
 const TILE: usize = 8;
+/// All segments of a ray.
+const ALL: std::ops::Range<i64> = i64::MIN..i64::MAX;
 
 /// [`TILE`] rows of the picture: all that is inlined below it is compiled once for each instruction set.
 struct Band<'a, const N: usize, S> {
     scene: &'a Scene<'a, N, S>,
-    overview: Option<&'a Overview>,
     first_row: usize,
     width: usize,
     pixels: &'a mut [[f32; 4]],
@@ -155,23 +146,16 @@ impl<const N: usize, S: Stored> pulp::NullaryFnOnce for Band<'_, N, S> {
     fn call(self) {
         let n_rows = self.pixels.len() / self.width;
         let plan = self.scene.plan;
-        let rows = self.first_row as u32..(self.first_row + n_rows) as u32;
-        let mut runs = Vec::new();
-        if self.overview.is_none() {
-            runs.push(i64::MIN..i64::MAX);
-        }
         for tile in (0..self.width).step_by(TILE) {
             let columns = tile..(tile + TILE).min(self.width);
-            if let Some(overview) = self.overview {
-                let beam = Beam::new(&plan.rays, plan.dims, &(columns.start as u32..columns.end as u32), &rows);
-                beam.runs(overview, plan, &mut runs);
-            }
+            let corner = UVec2::new(tile as u32, self.first_row as u32);
+            let runs = plan.beams.as_ref().map_or(std::slice::from_ref(&ALL), |beams| beams.runs(corner));
             if runs.is_empty() {
                 continue;
             }
             for (y, x) in (0..n_rows).flat_map(|y| columns.clone().map(move |x| (y, x))) {
                 let ray = plan.rays.ray(x as u32, (self.first_row + y) as u32);
-                self.pixels[y * self.width + x] = march::march(self.scene, &ray, &runs);
+                self.pixels[y * self.width + x] = march::march(self.scene, &ray, runs);
             }
         }
     }

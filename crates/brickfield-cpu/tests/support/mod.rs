@@ -8,8 +8,8 @@ use brickfield_core::{
     Aabb, BrickId, BrickLayout, BrickSide, Camera, Grid, Knot, Level, Projection, ScalarType, TransferFunction, Volume,
 };
 use brickfield_frame::{
-    BrickSet, Decode, FeatureSet, FramePlan, IndexEntry, IndexGrid, MacrocellRanges, Mode, RayFrame, SampleFormat,
-    Sampling,
+    Beams, BrickSet, Decode, FeatureSet, FramePlan, IndexEntry, IndexGrid, MacrocellRanges, Mode, Overview, RayFrame,
+    SampleFormat, Sampling,
 };
 use brickfield_optics::QuadratureRule;
 
@@ -77,7 +77,7 @@ impl<'a> Setup<'a> {
         let grid = self.volume.grid();
         let domain = whole(self.volume).intersection(&self.clip);
         let (index, bricks, visible) = cut(self);
-        FramePlan {
+        let mut plan = FramePlan {
             dims: grid.dims(),
             rays: RayFrame::new(&self.camera, grid, self.size, &domain, self.step_world),
             domain,
@@ -89,8 +89,14 @@ impl<'a> Setup<'a> {
                 .then(|| MacrocellRanges::of(&bricks).occupancy(&self.transfer))
                 .flatten(),
             bricks: Arc::new(bricks),
+            beams: None,
             features: FeatureSet::all(),
+        };
+        if self.skip == Skip::Transparent {
+            let overview = Overview::of(self.side, &plan.index, plan.occupancy.as_deref());
+            plan.beams = overview.and_then(|overview| Beams::of(&plan, &overview)).map(Arc::new);
         }
+        plan
     }
 }
 

@@ -105,6 +105,7 @@ impl Scene {
             sampling: Sampling::new(self.step, self.rule, self.mode).unwrap(),
             transfer: self.transfer.clone(),
             occupancy: None,
+            beams: None,
             features: self.features(&index),
             index,
             bricks: Arc::new(BrickSet::new(SIDE, self.format, decode, bytes).unwrap()),

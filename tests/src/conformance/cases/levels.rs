@@ -2,7 +2,7 @@
 
 use brickfield::bricks::Downsampling;
 use brickfield::lod::Criterion;
-use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickSide, Grid, Level, ScalarType, TransferFunction, Volume};
 use brickfield_optics::QuadratureRule;
 
@@ -129,6 +129,14 @@ fn skipping() -> Vec<Case> {
             cases.push(case);
         }
     }
+    cases.push(picture("skip/beams", catches![shader::BEAM_MIRRORED, shader::BEAM_HALVED], || {
+        Setup::new(sparse(&grid(), ScalarType::U8), soft(ScalarType::U8)).step(0.4)
+    }));
+    // So many pixels that tiles have 16 a side.
+    cases.push(picture("skip/beams-of-large-pictures", catches![shader::BEAM_MIRRORED], || {
+        Setup::new(sparse(&grid(), ScalarType::U8), soft(ScalarType::U8))
+            .with(|s| (s.step_voxels, s.size) = (2.0, UVec2::new(530, 510)))
+    }));
     cases.push(picture("skip/parallel", catches![VisibleTooSmall, shader::JUMPS_TOO_FAR], move || {
         scene().parallel(DVec3::X, 60.0)
     }));

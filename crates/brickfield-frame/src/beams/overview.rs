@@ -1,21 +1,22 @@
 //! Where a whole cut is dark: distances on a lattice over the volume.
 
-use std::sync::{Arc, Weak};
-
-use brickfield_core::glam::{UVec3, Vec3};
-use brickfield_frame::{FramePlan, IndexEntry, IndexGrid, MACROCELL_SIDE, Occupancy, QuadratureRule};
+use brickfield_core::BrickSide;
+use brickfield_core::glam::{UVec3, Vec3A};
 use rayon::prelude::*;
+
+use crate::{IndexEntry, IndexGrid, MACROCELL_SIDE, Occupancy};
 
 /// Most cells of a lattice: 128^3.
 const MAX_CELLS: usize = 1 << 21;
 /// Cells that a distance can tell; farther ones are as if that far away.
 const FARTHEST: u8 = 32;
 
-/// A lattice over the volume: the macrocells of bricks of level 0, or 2^m of them along each axis where those are too many.
+/// Where a whole cut is dark: a lattice over the volume, whose cells are the macrocells of bricks of level 0, or 2^m of them
+/// along each axis where those are more than 128^3.
 ///
 /// Each cell has its Chebyshev distance, in cells, to the nearest that may show something, whatever brick that is in.
 #[derive(Clone, Debug)]
-pub(super) struct Overview {
+pub struct Overview {
     n_cells: UVec3,
     distances: Vec<u8>,
     /// Where cells begin along each axis, in sample space; one more than there are cells.
@@ -49,56 +50,25 @@ impl Lattice {
     }
 }
 
-/// The overview of the last plan, kept for the next one.
-#[derive(Clone, Debug, Default)]
-pub(super) struct LastOverview {
-    overview: Option<Arc<Overview>>,
-    index: Option<IndexGrid>,
-    occupancy: Weak<Occupancy>,
-}
-
-impl LastOverview {
-    /// The overview of a plan; `None` where rays find their own way.
-    pub(super) fn get(&mut self, plan: &FramePlan) -> Option<Arc<Overview>> {
-        // Between levels, what is dark need not be connected: a pre-integrated segment could cross something visible.
-        if plan.sampling.rule() == QuadratureRule::PreIntegrated && has_levels(&plan.index) {
-            return None;
-        }
-        let occupancy = plan.occupancy.as_ref().map_or_else(Weak::new, Arc::downgrade);
-        if self.index.as_ref() != Some(&plan.index) || !self.occupancy.ptr_eq(&occupancy) {
-            let overview = Overview::of(plan).map(Arc::new);
-            *self = LastOverview { overview, index: Some(plan.index.clone()), occupancy };
-        }
-        self.overview.clone()
-    }
-}
-
 fn is_transparent(word: &u32) -> bool {
     matches!(IndexEntry::unpack(*word), IndexEntry::Transparent { .. })
-}
-
-/// Whether bricks of several levels are resident.
-fn has_levels(index: &IndexGrid) -> bool {
-    let mut levels = index.words().iter().filter(|w| !is_transparent(w)).map(|w| IndexEntry::unpack(*w).level());
-    levels.next().is_some_and(|first| levels.any(|level| level != first))
 }
 
 /// A box of positions.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Region {
-    pub(super) low: Vec3,
-    pub(super) high: Vec3,
+    pub(super) low: Vec3A,
+    pub(super) high: Vec3A,
 }
 
 impl Overview {
-    /// The overview of a plan; `None` if nothing in it is known to be dark.
-    fn of(plan: &FramePlan) -> Option<Overview> {
-        if plan.occupancy.is_none() && !plan.index.words().iter().any(is_transparent) {
+    /// The overview of an index of bricks and what is known of their macrocells; `None` if nothing is known to be dark.
+    pub fn of(side: BrickSide, index: &IndexGrid, occupancy: Option<&Occupancy>) -> Option<Overview> {
+        if occupancy.is_none() && !index.words().iter().any(is_transparent) {
             return None;
         }
-        let side = plan.bricks.side();
         let mut lattice = Lattice { n_brick: side.n_cells(), n_macrocells: Occupancy::n_macrocells(side), shift: 0 };
-        let n_macrocells = plan.index.dims() * lattice.n_macrocells;
+        let n_macrocells = index.dims() * lattice.n_macrocells;
         let n_cells = |shift: u32| (n_macrocells + ((1 << shift) - 1)) >> shift;
         let total = |n: UVec3| n.to_array().into_iter().map(|n| n as usize).product::<usize>();
         while total(n_cells(lattice.shift)) > MAX_CELLS {
@@ -107,22 +77,22 @@ impl Overview {
         let n_cells = n_cells(lattice.shift);
         let edges = n_cells.to_array().map(|n| edges(&lattice, n));
         let mut overview = Overview { n_cells, distances: vec![FARTHEST; total(n_cells)], edges, lattice };
-        overview.mark(plan);
+        overview.mark(index, occupancy);
         overview.spread();
         Some(overview)
     }
 
     /// Sets what may show something to 0.
-    fn mark(&mut self, plan: &FramePlan) {
-        let dims = plan.index.dims();
+    fn mark(&mut self, index: &IndexGrid, occupancy: Option<&Occupancy>) {
+        let dims = index.dims();
         for z in 0..dims.z {
             for y in 0..dims.y {
                 for x in 0..dims.x {
                     let cell = UVec3::new(x, y, z);
-                    let IndexEntry::Resident { slot, level } = plan.index.at(cell) else { continue };
+                    let IndexEntry::Resident { slot, level } = index.at(cell) else { continue };
                     // A coarse brick is marked once, from its lower corner.
                     if cell & (level.stride() - 1) == UVec3::ZERO {
-                        self.mark_brick(plan.occupancy.as_deref(), cell, slot, level.stride());
+                        self.mark_brick(occupancy, cell, slot, level.stride());
                     }
                 }
             }
@@ -185,16 +155,16 @@ impl Overview {
 
     /// All dark cells around the cell that holds `p`, as a box; `None` if that cell may show something.
     #[inline(always)]
-    pub(super) fn dark_around(&self, p: Vec3) -> Option<Region> {
+    pub(super) fn dark_around(&self, p: Vec3A) -> Option<Region> {
         let top = self.n_cells - 1;
-        let sample = p.max(Vec3::ZERO).as_uvec3();
+        let sample = p.max(Vec3A::ZERO).as_uvec3();
         let cell = UVec3::from(sample.to_array().map(|s| self.lattice.cell(s))).min(top);
         let i = cell.x + self.n_cells.x * (cell.y + self.n_cells.y * cell.z);
         let d = u32::from(self.distances[i as usize]);
         if d == 0 {
             return None;
         }
-        let (mut low, mut high) = (Vec3::ZERO, Vec3::ZERO);
+        let (mut low, mut high) = (Vec3A::ZERO, Vec3A::ZERO);
         for axis in 0..3 {
             let c = cell[axis];
             low[axis] = if c < d { f32::NEG_INFINITY } else { self.edges[axis][(c + 1 - d) as usize] };

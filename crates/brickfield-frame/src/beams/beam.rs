@@ -1,11 +1,11 @@
-//! Beams: the rays of a tile pass the dark together.
+//! The beam of one tile.
 
 use std::ops::Range;
 
-use brickfield_core::glam::{DVec3, UVec3, Vec3};
-use brickfield_frame::{FramePlan, PlanRay, RayFrame};
+use brickfield_core::glam::{DVec3, UVec3, Vec3A};
 
 use super::overview::{Overview, Region};
+use crate::{FramePlan, PlanRay, RayFrame};
 
 /// Positions this near to a face, in samples, may belong to either side.
 const MARGIN: f64 = 1.0 / 64.0;
@@ -24,10 +24,10 @@ pub(super) struct Beam {
 /// A position in sample space that moves.
 #[derive(Clone, Copy, Debug)]
 struct Line {
-    at: Vec3,
+    at: Vec3A,
     /// Samples per world unit.
-    change: Vec3,
-    inverse: Vec3,
+    change: Vec3A,
+    inverse: Vec3A,
 }
 
 impl Beam {
@@ -40,8 +40,8 @@ impl Beam {
         let margin = swell * (t_center + rays.start).max(0.0) + MARGIN + dims.as_dvec3().max_element() * 1e-6;
         let line = |ray: &PlanRay, side: f64| {
             let at = rays.center + ray.at(t_center) + margin * side;
-            let change = (ray.direction + swell * side).as_vec3();
-            Line { at: at.as_vec3(), change, inverse: change.recip() }
+            let change = (ray.direction + swell * side).as_vec3a();
+            Line { at: at.as_vec3a(), change, inverse: change.recip() }
         };
         let lines = |side| [0, 1, 2, 3].map(|i: usize| line(&corners[i], side));
         Beam { low: lines(-1.0), high: lines(1.0), t_center }
@@ -81,28 +81,24 @@ impl Beam {
             if inside_low.min_element() < 0.0 || inside_high.min_element() < 0.0 {
                 return None;
             }
-            for axis in 0..3 {
-                if low.change[axis] < 0.0 {
-                    exit = exit.min(u - inside_low[axis] * low.inverse[axis]);
-                }
-                if high.change[axis] > 0.0 {
-                    exit = exit.min(u + inside_high[axis] * high.inverse[axis]);
-                }
-            }
+            let never = Vec3A::INFINITY;
+            let down = Vec3A::select(low.change.cmplt(Vec3A::ZERO), -inside_low * low.inverse, never);
+            let up = Vec3A::select(high.change.cmpgt(Vec3A::ZERO), inside_high * high.inverse, never);
+            exit = exit.min(down.min(up).min_element());
         }
-        Some(exit)
+        Some(u + exit)
     }
 
-    fn center(&self, u: f32) -> Vec3 {
-        self.low.iter().chain(&self.high).map(|line| line.position(u)).sum::<Vec3>() / 8.0
+    fn center(&self, u: f32) -> Vec3A {
+        self.low.iter().chain(&self.high).map(|line| line.position(u)).sum::<Vec3A>() / 8.0
     }
 
-    /// The segments in which a ray of the tile may see something, front to back; `runs` is emptied first.
-    pub(super) fn runs(&self, overview: &Overview, plan: &FramePlan, runs: &mut Vec<Range<i64>>) {
-        runs.clear();
+    /// The segments in which a ray of the tile may see something, front to back.
+    pub(super) fn runs(&self, overview: &Overview, plan: &FramePlan) -> Vec<Range<i64>> {
+        let mut runs: Vec<Range<i64>> = Vec::new();
         let step = plan.sampling.step_world();
         let segment = |u: f32| (f64::from(u) + self.t_center) / step;
-        let visible = Region { low: plan.visible.min.as_vec3(), high: plan.visible.max.as_vec3() };
+        let visible = Region { low: plan.visible.min.as_vec3a(), high: plan.visible.max.as_vec3a() };
         let (start, end) = self.span(visible);
         // A beam that widens faster than it moves never leaves a box.
         let end = end.min((plan.rays.n_segments * step - self.t_center) as f32);
@@ -123,12 +119,13 @@ impl Beam {
             }
             u = next;
         }
+        runs
     }
 }
 
 impl Line {
     #[inline(always)]
-    fn position(&self, u: f32) -> Vec3 {
+    fn position(&self, u: f32) -> Vec3A {
         self.at + self.change * u
     }
 }
@@ -165,13 +162,13 @@ mod tests {
                 [tile, tile + UVec2::new(7, 0), tile + UVec2::new(0, 7), tile + 7].map(|p| rays.ray(p.x, p.y));
             for (x, y) in columns.clone().flat_map(|x| rows.clone().map(move |y| (x, y))) {
                 for t in [0.0, 3.0, 20.0, 60.0] {
-                    let p = (rays.center + rays.ray(x, y).at(t)).as_vec3();
+                    let p = (rays.center + rays.ray(x, y).at(t)).as_vec3a();
                     let at = |line: &Line| line.position((t - beam.t_center) as f32);
-                    let low = beam.low.iter().map(at).reduce(Vec3::min).unwrap();
-                    let high = beam.high.iter().map(at).reduce(Vec3::max).unwrap();
+                    let low = beam.low.iter().map(at).reduce(Vec3A::min).unwrap();
+                    let high = beam.high.iter().map(at).reduce(Vec3A::max).unwrap();
                     of_beam = of_beam.max((low - p).max(p - high).max_element());
-                    let ends = corners.map(|ray| (rays.center + ray.at(t)).as_vec3());
-                    let (low, high) = (ends.into_iter().reduce(Vec3::min), ends.into_iter().reduce(Vec3::max));
+                    let ends = corners.map(|ray| (rays.center + ray.at(t)).as_vec3a());
+                    let (low, high) = (ends.into_iter().reduce(Vec3A::min), ends.into_iter().reduce(Vec3A::max));
                     of_corners = of_corners.max((low.unwrap() - p).max(p - high.unwrap()).max_element());
                 }
             }
