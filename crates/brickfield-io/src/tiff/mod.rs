@@ -4,6 +4,7 @@
 //! writers are about paper. Of several channels and frames the first is read. Not: colours, palettes, packed bits.
 
 mod description;
+mod tags;
 
 use std::io::{BufRead, Seek, SeekFrom};
 
@@ -21,6 +22,7 @@ use crate::placement::Placement;
 use crate::samples::allocate;
 use crate::{Format, Limits, Note, Opened, ReadError};
 use description::Description;
+use tags::check_tags;
 
 /// Reads a TIFF stack; the outer corner of the first voxel is the world's origin.
 ///
@@ -38,6 +40,7 @@ fn read_from(source: &mut dyn ByteSource, limits: &Limits) -> Result<Opened, Rea
     if n_file_bytes == 0 {
         return Err(ReadError::Empty);
     }
+    check_tags(source, n_file_bytes)?;
     let mut decoder = Decoder::new(source).map_err(fault)?.with_limits(header_limits());
     let mut found = Found::pictures(Format::Tiff);
     let first = Page::read(&mut decoder)?;
@@ -62,6 +65,7 @@ fn fault(e: TiffError) -> ReadError {
 fn header_limits() -> TiffLimits {
     let mut limits = TiffLimits::default();
     limits.ifd_value_size = 64 << 20;
+    limits.decoding_buffer_size = 64 << 20;
     limits
 }
 

@@ -285,6 +285,12 @@ fn lengths_beyond_the_file_are_refused_before_they_are_allocated() {
     unknown[at..at + 2].copy_from_slice(b"D\xa8");
     let fault = read(unknown).unwrap_err().to_string();
     assert!(fault.starts_with("length of element (0020,0032) is \"844902449\""), "{fault}");
+    // Found by fuzzing: of a length that is no whole number of values, the parser takes the rest for elements.
+    let at = whole.windows(6).position(|w| w == b"\x28\0\x10\0US").unwrap() + 6;
+    let mut odd = whole.clone();
+    odd[at..at + 2].copy_from_slice(&3u16.to_le_bytes());
+    let fault = read(odd).unwrap_err().to_string();
+    assert_eq!(fault, "length of element (0028,0010) is \"3\"; expected a multiple of 2");
     // A group length that is too short would make meta elements part of the data set.
     let mut short = whole.clone();
     short[140..144].copy_from_slice(&[0; 4]);

@@ -106,6 +106,12 @@ fn pages_that_lie() {
     huge[22..24].copy_from_slice(&[255, 255]);
     huge[34..36].copy_from_slice(&[255, 255]);
     assert!(refusal(huge.clone()).contains("a page of 65535 x 65535 samples of u16 would take"));
+    // Found by fuzzing: the decoder made room for 256 MiB of values before it looked for them.
+    let mut long_tag = big_endian([0; 4]);
+    long_tag[42..46].copy_from_slice(&[0, 0x80, 0, 0]);
+    assert!(
+        refusal(long_tag).contains("number of a tag's values is \"8388608\"; expected at most 114, the file's bytes")
+    );
     let roomy = Limits { max_bytes: 1 << 40 };
     assert!(matches!(tiff::read(Cursor::new(huge), &roomy), Err(ReadError::TooFewCompressed { .. })));
     let description = "ImageJ=1.53\nimages=99\nslices=99\n";
