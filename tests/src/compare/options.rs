@@ -7,6 +7,7 @@ use brickfield::BackendKind;
 use brickfield::frame::Mode;
 use brickfield::optics::QuadratureRule;
 use brickfield::options::{InputOptions, TreeOptions, ViewOptions};
+use clap::builder::ArgPredicate;
 use clap::parser::ValueSource;
 use clap::{CommandFactory, FromArgMatches, Parser};
 
@@ -82,8 +83,11 @@ pub fn parse(arguments: Vec<OsString>) -> Result<CompareArgs, clap::Error> {
     let words = arguments.iter().skip(1).map(|a| quoted(&a.to_string_lossy()));
     let command = std::iter::once("compare".to_owned()).chain(words).collect::<Vec<_>>().join(" ");
     // Small enough that fine steps end in time; all rows of a report share one size.
-    let mut matches =
-        CompareArgs::command().mut_arg("size", |a| a.default_value("128x128")).try_get_matches_from(arguments)?;
+    let size = |a: clap::Arg| {
+        let a = a.help("Size of the picture in pixels; of a file 256x256 unless stated");
+        a.default_value("128x128").default_value_if("file", ArgPredicate::IsPresent, "256x256")
+    };
+    let mut matches = CompareArgs::command().mut_arg("size", size).try_get_matches_from(arguments)?;
     let default_camera = matches.value_source("camera") == Some(ValueSource::DefaultValue);
     let args = CompareArgs::from_arg_matches_mut(&mut matches)?;
     Ok(CompareArgs { default_camera, command, ..args })
@@ -132,6 +136,7 @@ mod tests {
         assert_eq!((a.file.as_ref(), a.backends.len(), a.rules.len(), a.modes.len()), (None, 3, 5, 2));
         assert_eq!((a.view.size.to_array(), a.default_camera), ([128, 128], true));
         assert!(!args("--camera front").unwrap().default_camera);
+        assert_eq!(args("x.vti").unwrap().view.size.to_array(), [256, 256]);
     }
 
     #[test]
