@@ -32,8 +32,8 @@ pub struct TreeOptions {
     /// Samples along a brick's side: 16, 32 or 64
     #[arg(long, value_name = "N", default_value = "32", value_parser = brick_side)]
     pub brick: BrickSide,
-    /// How coarser levels come about: subsample or average
-    #[arg(long, value_name = "HOW", default_value = "average", value_parser = downsampling)]
+    /// How coarser levels come about: subsample (sharper) or average (no aliasing)
+    #[arg(long, value_name = "HOW", default_value = "subsample", value_parser = downsampling)]
     pub downsampling: Downsampling,
 }
 
