@@ -15,8 +15,15 @@ pub struct Residency {
     /// Of the set, once a frame asked for it.
     ranges: Option<MacrocellRanges>,
     occupancy: Option<(TransferFunction, Option<Arc<Occupancy>>)>,
-    /// Of the last index and occupancy.
-    overview: Option<(IndexGrid, Option<Arc<Occupancy>>, Option<Arc<Overview>>)>,
+    overview: Option<LastOverview>,
+}
+
+/// The overview of the last frame, and what it is of.
+#[derive(Clone, Debug)]
+struct LastOverview {
+    index: IndexGrid,
+    occupancy: Option<Arc<Occupancy>>,
+    overview: Option<Arc<Overview>>,
 }
 
 impl Residency {
@@ -53,16 +60,17 @@ impl Residency {
 
     /// The overview of an index of the held set; `None` if nothing in it is known to be dark.
     pub(crate) fn overview(&mut self, index: &IndexGrid, occupancy: Option<&Arc<Occupancy>>) -> Option<Arc<Overview>> {
-        let same = |held: &Option<Arc<Occupancy>>| match (held, occupancy) {
-            (Some(held), Some(occupancy)) => Arc::ptr_eq(held, occupancy),
-            (held, occupancy) => held.is_none() && occupancy.is_none(),
+        let address = |o: &Arc<Occupancy>| Arc::as_ptr(o);
+        let is_of = |last: &LastOverview| {
+            last.occupancy.as_ref().map(address) == occupancy.map(address) && last.index == *index
         };
         match &self.overview {
-            Some((of, held, overview)) if of == index && same(held) => overview.clone(),
+            Some(last) if is_of(last) => last.overview.clone(),
             _ => {
                 let side = self.set.as_ref()?.side();
                 let overview = Overview::of(side, index, occupancy.map(Arc::as_ref)).map(Arc::new);
-                self.overview = Some((index.clone(), occupancy.cloned(), overview.clone()));
+                let (index, occupancy) = (index.clone(), occupancy.cloned());
+                self.overview = Some(LastOverview { index, occupancy, overview: overview.clone() });
                 overview
             }
         }
