@@ -25,7 +25,7 @@ pub enum PrepareError {
     Step { step_voxels: f64 },
     #[error("clip box from {} to {}: every lower corner must be below the upper one", clip.min, clip.max)]
     Clip { clip: Aabb },
-    #[error("rays of {n_segments:.3e} segments; at most {limit} are possible: take a larger step")]
+    #[error("rays of {n_segments:.3e} segments; at most {limit} are possible: take a larger step or a nearer eye")]
     TooManySegments { n_segments: f64, limit: u32 },
     #[error("{n_bricks} bricks; an index tells at most {limit} apart: take larger bricks or a coarser level")]
     TooManyBricks { n_bricks: usize, limit: u32 },
@@ -53,7 +53,9 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
         return Err(PrepareError::Step { step_voxels: scene.step_voxels });
     }
     let sampling = Sampling::new(step_world, scene.rule, scene.mode)?;
-    check_segments(&grid.world_box(), step_world)?;
+    check_segments(grid.world_box().diagonal() / step_world)?;
+    let rays = RayFrame::new(&scene.camera, grid, scene.size, &volume_box(tree), step_world);
+    check_segments(rays.n_segments)?;
     let selection = select_cut(tree.layout(), grid, &view(scene), &scene.detail);
     let resident = resident_bricks(tree, scene, &selection, &domain);
     if resident.len() >= IndexEntry::MAX_SLOTS as usize {
@@ -73,7 +75,7 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
     };
     let mut plan = FramePlan {
         dims: grid.dims(),
-        rays: RayFrame::new(&scene.camera, grid, scene.size, &volume_box(tree), step_world),
+        rays,
         domain,
         visible,
         sampling,
@@ -106,8 +108,7 @@ fn check_size(size: UVec2) -> Result<(), PrepareError> {
     Err(PrepareError::Size { size, limit: MAX_IMAGE })
 }
 
-fn check_segments(world: &Aabb, step_world: f64) -> Result<(), PrepareError> {
-    let n_segments = world.diagonal() / step_world;
+fn check_segments(n_segments: f64) -> Result<(), PrepareError> {
     if n_segments < f64::from(MAX_SEGMENTS) {
         return Ok(());
     }
@@ -219,4 +220,25 @@ fn features(plan: &FramePlan, levels_differ: bool) -> FeatureSet {
         (Feature::TransferLookup, plan.transfer.knots().len() > 1),
     ];
     needed.into_iter().filter(|(_, need)| *need).map(|(feature, _)| feature).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use brickfield_bricks::{BuildOptions, build_tree};
+    use brickfield_core::{Camera, Grid, Projection, TransferFunction, Volume};
+
+    #[test]
+    fn an_eye_so_far_that_segments_cannot_be_counted_is_refused() {
+        let grid = Grid::axis_aligned(UVec3::splat(8), DVec3::ONE).unwrap();
+        let tree = build_tree(&Volume::new(grid, vec![1u8; 512]).unwrap(), &BuildOptions::default()).unwrap();
+        let fog = TransferFunction::constant(0.1, [1.0; 3]).unwrap();
+        let plan = |distance: f64| {
+            let projection = Projection::Perspective { fov_y: 0.5 };
+            let camera = Camera::look_at(DVec3::X * distance, DVec3::ZERO, DVec3::Z, projection).unwrap();
+            prepare(&tree, &Scene::new(camera, UVec2::new(4, 4), fog.clone()), &mut Residency::default())
+        };
+        assert!(plan(1e6).is_ok());
+        assert!(matches!(plan(1e30), Err(PrepareError::TooManySegments { .. })), "{:?}", plan(1e30).err());
+    }
 }

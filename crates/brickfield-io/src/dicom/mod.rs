@@ -3,7 +3,7 @@
 //! Uncompressed, RLE, JPEG baseline and lossless. Not: multi-frame objects, colours, JPEG 2000, JPEG-LS, deflated.
 //!
 //! Slices are sorted by position along their normal and kept as they are: none is resampled. Gantry tilt becomes a
-//! sheared grid, which is exact. Uneven steps cannot be a grid; it gets the median step, and
+//! sheared grid, which is exact. Uneven steps cannot be a grid; it gets the mean step, and
 //! [`Note::UnevenSpacing`] has all positions, so that nothing is lost.
 
 mod elements;
@@ -52,6 +52,8 @@ fn read_headers(names: &[String], files: &dyn DataFiles, notes: &mut Vec<Note>) 
     for name in names {
         match guarded("DICOM", || Slice::read(name, files)) {
             Ok(slice) => slices.push(slice),
+            // A slice that is damaged: without it the volume would have another shape.
+            Err(fault @ ReadError::Field { .. }) => return Err(ReadError::decoder(format!("slice {name:?}"), fault)),
             Err(fault) => skipped.push((name, fault)),
         }
     }

@@ -235,10 +235,23 @@ fn rescales_may_differ_from_slice_to_slice() {
 #[test]
 fn uneven_spacing_is_told_with_all_positions() {
     let opened = read(&[Slice::at(0.0), Slice::at(1.0), Slice::at(2.0), Slice::at(5.0)]).unwrap();
-    assert_eq!(opened.volume.grid().spacing().z, 1.0);
+    // The extent is right whatever the steps.
+    let mean_step = 5.0 / 3.0;
+    assert_eq!(opened.volume.grid().spacing().z, mean_step);
     let positions = vec![0.0, 1.0, 2.0, 5.0];
-    let expected = Note::UnevenSpacing { positions, min_step: 1.0, median_step: 1.0, max_step: 3.0 };
+    let max_shift = 2.0 * mean_step - 2.0;
+    let expected = Note::UnevenSpacing { positions, min_step: 1.0, mean_step, max_step: 3.0, max_shift };
     assert_eq!(opened.notes, [expected]);
+}
+
+#[test]
+fn a_damaged_slice_is_not_left_out() {
+    let [first, mut cut, last] = [0.0, 1.0, 2.0].map(|z| Slice::at(z).bytes());
+    cut.truncate(cut.len() - 5);
+    let names = ["a", "b", "c"].map(str::to_owned);
+    let files = crate::common::files([("a", first), ("b", cut), ("c", last)]);
+    let fault = dicom::read(&names, &files, &LIMITS).unwrap_err().to_string();
+    assert!(fault.contains("slice \"b\"") && fault.contains("length of element (7fe0,0010)"), "{fault}");
 }
 
 #[test]
@@ -278,19 +291,19 @@ fn lengths_beyond_the_file_are_refused_before_they_are_allocated() {
         b"\x08\0\x40\x11SQ\0\0\xff\xff\xff\xff\xfe\xff\0\xe0\xff\xff\xff\xff".repeat(100_000),
     ];
     let fault = read(nested.concat()).unwrap_err().to_string();
-    assert_eq!(fault, "nesting of sequences is \"33\"; expected at most 32");
+    assert_eq!(fault, "slice \"a\": nesting of sequences is \"33\"; expected at most 32");
     // Found by fuzzing: to the parser, an unknown representation has a length of 32 bits.
     let at = whole.windows(4).position(|w| w == b"\x20\0\x32\0").unwrap() + 4;
     let mut unknown = whole.clone();
     unknown[at..at + 2].copy_from_slice(b"D\xa8");
     let fault = read(unknown).unwrap_err().to_string();
-    assert!(fault.starts_with("length of element (0020,0032) is \"844902449\""), "{fault}");
+    assert!(fault.starts_with("slice \"a\": length of element (0020,0032) is \"844902449\""), "{fault}");
     // Found by fuzzing: of a length that is no whole number of values, the parser takes the rest for elements.
     let at = whole.windows(6).position(|w| w == b"\x28\0\x10\0US").unwrap() + 6;
     let mut odd = whole.clone();
     odd[at..at + 2].copy_from_slice(&3u16.to_le_bytes());
     let fault = read(odd).unwrap_err().to_string();
-    assert_eq!(fault, "length of element (0028,0010) is \"3\"; expected a multiple of 2");
+    assert_eq!(fault, "slice \"a\": length of element (0028,0010) is \"3\"; expected a multiple of 2");
     // A group length that is too short would make meta elements part of the data set.
     let mut short = whole.clone();
     short[140..144].copy_from_slice(&[0; 4]);
@@ -302,5 +315,8 @@ fn lengths_beyond_the_file_are_refused_before_they_are_allocated() {
     let at = whole.len() - 12 - 4;
     huge[at..at + 4].copy_from_slice(&0xffff_fff0u32.to_le_bytes());
     let fault = read(huge).unwrap_err().to_string();
-    assert_eq!(fault, "length of element (7fe0,0010) is \"4294967280\"; expected at most the 12 bytes left");
+    assert_eq!(
+        fault,
+        "slice \"a\": length of element (7fe0,0010) is \"4294967280\"; expected at most the 12 bytes left"
+    );
 }
