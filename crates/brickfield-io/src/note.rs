@@ -13,7 +13,7 @@ pub enum Note {
     NonFinite(NonFinite),
     /// Slices that are not evenly spaced. `positions` are the distances from the first slice along the stack, in
     /// world units; the grid has the median step, and voxels are as in the file.
-    UnevenSpacing { positions: Vec<f64>, min_step: f64, mean_step: f64, max_step: f64, max_shift: f64 },
+    UnevenSpacing { positions: Vec<f64>, min_step: f64, median_step: f64, max_step: f64, max_shift: f64 },
     /// The slices are sheared against their normal. The grid honours it: its third direction is not the normal.
     GantryTilt { degrees: f64 },
     /// The file has several arrays (channels, data sets); one was read.
@@ -51,9 +51,9 @@ impl fmt::Display for Note {
                 n.n_positive_infinity,
                 n.n_negative_infinity
             ),
-            Note::UnevenSpacing { positions, min_step, mean_step, max_step, max_shift } => write!(
+            Note::UnevenSpacing { positions, min_step, median_step, max_step, max_shift } => write!(
                 f,
-                "{} slices are unevenly spaced, by {min_step:.4} to {max_step:.4}; the mean {mean_step:.4} is used, which puts them up to {max_shift:.4} out of place",
+                "{} slices are unevenly spaced, by {min_step:.4} to {max_step:.4}; the median {median_step:.4} is used, which puts them up to {max_shift:.4} out of place",
                 positions.len()
             ),
             Note::GantryTilt { degrees } => write!(f, "gantry tilt of {degrees:.2} degrees; the grid is sheared by it"),

@@ -25,6 +25,8 @@ pub struct AdapterInfo {
     pub name: String,
     /// The driver's name and version.
     pub driver: String,
+    /// Whether it renders on the processor: then the CPU backend is quicker.
+    pub is_software: bool,
 }
 
 /// What there is of a backend: its adapters, or why there are none.
@@ -112,7 +114,7 @@ fn adapters(kind: BackendKind) -> Result<Vec<AdapterInfo>, String> {
         BackendKind::Cpu => {
             let backend = CpuBackend::new();
             let d = backend.describe();
-            Ok(vec![AdapterInfo { index: 0, name: d.adapter.clone(), driver: d.driver.clone() }])
+            Ok(vec![AdapterInfo { index: 0, name: d.adapter.clone(), driver: d.driver.clone(), is_software: true }])
         }
         BackendKind::Wgpu => wgpu_adapters(),
         BackendKind::Ash => ash_adapters(),
@@ -133,8 +135,11 @@ fn open_cpu(adapter: Option<&str>) -> Result<Box<dyn Backend>, BackendError> {
 
 #[cfg(feature = "wgpu")]
 fn wgpu_adapters() -> Result<Vec<AdapterInfo>, String> {
-    let list = brickfield_wgpu::adapters().into_iter();
-    let list: Vec<_> = list.map(|a| AdapterInfo { index: a.index, name: a.name, driver: a.driver }).collect();
+    let info = |a: brickfield_wgpu::AdapterSummary| {
+        let is_software = a.kind == "software";
+        AdapterInfo { index: a.index, name: a.name, driver: a.driver, is_software }
+    };
+    let list: Vec<_> = brickfield_wgpu::adapters().into_iter().map(info).collect();
     if list.is_empty() { Err(brickfield_wgpu::OpenError::NoAdapter.to_string()) } else { Ok(list) }
 }
 
@@ -152,8 +157,11 @@ fn open_wgpu(adapter: Option<&str>, validation: Validation) -> Result<Box<dyn Ba
 
 #[cfg(feature = "ash")]
 fn ash_adapters() -> Result<Vec<AdapterInfo>, String> {
-    let list = brickfield_ash::adapters().map_err(|e| e.to_string())?.into_iter();
-    let list: Vec<_> = list.map(|a| AdapterInfo { index: a.index, name: a.name, driver: a.driver }).collect();
+    let info = |a: brickfield_ash::AdapterSummary| {
+        let is_software = a.kind == brickfield_ash::AdapterKind::Cpu;
+        AdapterInfo { index: a.index, name: a.name, driver: a.driver, is_software }
+    };
+    let list: Vec<_> = brickfield_ash::adapters().map_err(|e| e.to_string())?.into_iter().map(info).collect();
     if list.is_empty() { Err(brickfield_ash::ConnectError::NoDevice.to_string()) } else { Ok(list) }
 }
 

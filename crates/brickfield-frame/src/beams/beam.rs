@@ -111,7 +111,7 @@ impl Beam {
                 u = exit;
                 continue;
             }
-            let next = u + pace;
+            let next = (u + pace).max(u.next_up());
             let run = segment(u).floor() as i64..segment(next.min(end)).ceil() as i64;
             match runs.last_mut() {
                 Some(last) if run.start < last.end + SHORTEST => last.end = run.end,

@@ -3,7 +3,7 @@
 //! Uncompressed, RLE, JPEG baseline and lossless. Not: multi-frame objects, colours, JPEG 2000, JPEG-LS, deflated.
 //!
 //! Slices are sorted by position along their normal and kept as they are: none is resampled. Gantry tilt becomes a
-//! sheared grid, which is exact. Uneven steps cannot be a grid; it gets the mean step, and
+//! sheared grid, which is exact. Uneven steps cannot be a grid; it gets the median step, and
 //! [`Note::UnevenSpacing`] has all positions, so that nothing is lost.
 
 mod elements;

@@ -83,11 +83,11 @@ fn stated_step(slice: &Slice, notes: &mut Vec<Note>) -> f64 {
     })
 }
 
-/// Steps may differ by this share of their mean before they are called uneven.
+/// Steps may differ by this share of their median before they are called uneven.
 const EVEN_WITHIN: f64 = 0.01;
 const MIN_TILT_DEGREES: f64 = 0.05;
 
-/// The step from slice to slice: their mean, so that the first and the last are in their places.
+/// The step from slice to slice: along the line through first and last, of the median length.
 fn step_through(positions: &[DVec3], normal: DVec3, notes: &mut Vec<Note>) -> DVec3 {
     let (first, last) = (positions[0], positions[positions.len() - 1]);
     let direction = (last - first).normalize_or(normal);
@@ -96,13 +96,14 @@ fn step_through(positions: &[DVec3], normal: DVec3, notes: &mut Vec<Note>) -> DV
         notes.push(Note::GantryTilt { degrees });
     }
     let distances: Vec<f64> = positions.iter().map(|p| (*p - first).dot(direction)).collect();
-    let steps = || distances.windows(2).map(|w| w[1] - w[0]);
-    let (min_step, max_step) = (steps().fold(f64::INFINITY, f64::min), steps().fold(f64::NEG_INFINITY, f64::max));
-    let mean_step = distances[distances.len() - 1] / steps().len() as f64;
-    if max_step - min_step > EVEN_WITHIN * mean_step.abs() {
-        let shift = |(i, d): (usize, &f64)| (d - i as f64 * mean_step).abs();
+    let mut steps: Vec<f64> = distances.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let (min_step, median_step, max_step) = (steps[0], steps[steps.len() / 2], steps[steps.len() - 1]);
+    if max_step - min_step > EVEN_WITHIN * median_step.abs() {
+        let shift = |(i, d): (usize, &f64)| (d - i as f64 * median_step).abs();
         let max_shift = distances.iter().enumerate().map(shift).fold(0.0, f64::max);
-        notes.push(Note::UnevenSpacing { positions: distances.clone(), min_step, mean_step, max_step, max_shift });
+        notes.push(Note::UnevenSpacing { positions: distances, min_step, median_step, max_step, max_shift });
+        return direction * median_step;
     }
-    (last - first) / steps().len() as f64
+    (last - first) / steps.len() as f64
 }

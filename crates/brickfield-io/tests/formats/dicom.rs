@@ -235,12 +235,9 @@ fn rescales_may_differ_from_slice_to_slice() {
 #[test]
 fn uneven_spacing_is_told_with_all_positions() {
     let opened = read(&[Slice::at(0.0), Slice::at(1.0), Slice::at(2.0), Slice::at(5.0)]).unwrap();
-    // The extent is right whatever the steps.
-    let mean_step = 5.0 / 3.0;
-    assert_eq!(opened.volume.grid().spacing().z, mean_step);
+    assert_eq!(opened.volume.grid().spacing().z, 1.0);
     let positions = vec![0.0, 1.0, 2.0, 5.0];
-    let max_shift = 2.0 * mean_step - 2.0;
-    let expected = Note::UnevenSpacing { positions, min_step: 1.0, mean_step, max_step: 3.0, max_shift };
+    let expected = Note::UnevenSpacing { positions, min_step: 1.0, median_step: 1.0, max_step: 3.0, max_shift: 2.0 };
     assert_eq!(opened.notes, [expected]);
 }
 

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use brickfield::options::{InputOptions, SamplingOptions, TreeOptions, ViewOptions};
-use brickfield::{BackendKind, Validation};
+use brickfield::{BackendKind, BackendStatus, Validation, backends};
 use clap::{Args, Parser, Subcommand};
 
 /// Renders scalar volumes by multiresolution bricks, on the CPU, through wgpu and through raw Vulkan.
@@ -55,7 +55,7 @@ struct RenderArgs {
     /// Picture to write: .exr (linear, for measuring) or .png (sRGB, for looking)
     #[arg(short, long, value_name = "PICTURE")]
     out: PathBuf,
-    /// auto (the first GPU adapter, else the CPU), cpu, wgpu or ash
+    /// auto (the first GPU, else the CPU; drivers in software are not GPUs), cpu, wgpu or ash
     #[arg(long, default_value = "auto")]
     backend: String,
     /// Adapter: its number or a part of its name, as `brickfield backends` lists them
@@ -136,10 +136,17 @@ fn print_backends() {
 impl RenderArgs {
     /// The backends to try, in order.
     fn candidates(&self) -> Result<Vec<BackendKind>, Failure> {
-        if self.backend == "auto" {
-            return Ok(vec![BackendKind::Ash, BackendKind::Wgpu, BackendKind::Cpu]);
+        if self.backend != "auto" {
+            return Ok(vec![self.backend.parse().map_err(Failure::Backend)?]);
         }
-        Ok(vec![self.backend.parse().map_err(Failure::Backend)?])
+        // A driver in software is slower than the CPU backend: it is for those who ask for it.
+        let is_asked_for = self.adapter.is_some() || self.validation;
+        let has_gpu = |kind: &BackendKind| {
+            let is_gpu = |status: &BackendStatus| matches!(&status.adapters, Ok(a) if a.iter().any(|a| !a.is_software));
+            is_asked_for || backends().iter().any(|status| status.kind == *kind && is_gpu(status))
+        };
+        let gpus = [BackendKind::Ash, BackendKind::Wgpu].into_iter().filter(has_gpu);
+        Ok(gpus.chain([BackendKind::Cpu]).collect())
     }
 
     fn validation(&self) -> Validation {

@@ -16,6 +16,11 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let subject = Subject { frame: opened.frame, tree: args.tree.build(&opened.volume)?, transfer };
     let scene = args.view.scene(&subject, &args.sampling)?;
     let plan = prepare(&subject.tree, &scene, &mut Residency::default())?;
+    if plan.visible.is_empty() {
+        eprintln!(
+            "note: nothing is visible: the transfer function is 0 over all values inside the clip box and the view"
+        );
+    }
     let frame = backend.render(&plan)?;
     let attributes = attributes(args, backend.as_ref(), &scene);
     write_picture(&args.out, &frame.image, args.view.background.0, &attributes)?;
