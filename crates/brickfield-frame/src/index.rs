@@ -84,6 +84,11 @@ impl IndexGrid {
         &mut self.words
     }
 
+    /// Whether any cell is transparent.
+    pub fn has_transparent(&self) -> bool {
+        self.words.iter().any(|w| matches!(IndexEntry::unpack(*w), IndexEntry::Transparent { .. }))
+    }
+
     /// The entry of a cell.
     ///
     /// # Panics

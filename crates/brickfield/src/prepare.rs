@@ -65,13 +65,13 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
     let visible = visible_box(tree, &resident, &domain);
     let levels_differ = resident.iter().any(|id| id.level != Level(0));
     let bricks = residency.hold(tree, resident);
-    let occupancy = match scene.skipping {
-        Skipping::On => residency.occupancy(&scene.transfer),
-        Skipping::Off => None,
-    };
-    let overview = match scene.skipping {
-        Skipping::On => residency.overview(&index, occupancy.as_ref()),
-        Skipping::Off => None,
+    let (occupancy, overview) = match scene.skipping {
+        Skipping::On => {
+            let occupancy = residency.occupancy(&scene.transfer);
+            let overview = residency.overview(&index, occupancy.as_ref());
+            (occupancy, overview)
+        }
+        Skipping::Off => (None, None),
     };
     let mut plan = FramePlan {
         dims: grid.dims(),
@@ -207,13 +207,11 @@ fn visible_box(tree: &BrickTree, resident: &[BrickId], domain: &Aabb) -> Aabb {
 }
 
 fn features(plan: &FramePlan, levels_differ: bool) -> FeatureSet {
-    let any_transparent =
-        plan.index.words().iter().any(|w| matches!(IndexEntry::unpack(*w), IndexEntry::Transparent { .. }));
     let fast = matches!(plan.sampling.mode(), Mode::Fast { .. });
     let needed = [
         (Feature::HardwareFilter, fast),
         (Feature::EarlyTermination, plan.sampling.transmittance_floor() > 0.0),
-        (Feature::SkipTransparent, any_transparent),
+        (Feature::SkipTransparent, plan.index.has_transparent()),
         (Feature::SkipMacrocells, plan.occupancy.is_some()),
         (Feature::SkipBesideBeams, plan.beams.is_some()),
         (Feature::MultiLevel, levels_differ),

@@ -50,10 +50,6 @@ impl Lattice {
     }
 }
 
-fn is_transparent(word: &u32) -> bool {
-    matches!(IndexEntry::unpack(*word), IndexEntry::Transparent { .. })
-}
-
 /// A box of positions.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Region {
@@ -64,7 +60,7 @@ pub(super) struct Region {
 impl Overview {
     /// The overview of an index of bricks and what is known of their macrocells; `None` if nothing is known to be dark.
     pub fn of(side: BrickSide, index: &IndexGrid, occupancy: Option<&Occupancy>) -> Option<Overview> {
-        if occupancy.is_none() && !index.words().iter().any(is_transparent) {
+        if occupancy.is_none() && !index.has_transparent() {
             return None;
         }
         let mut lattice = Lattice { n_brick: side.n_cells(), n_macrocells: Occupancy::n_macrocells(side), shift: 0 };

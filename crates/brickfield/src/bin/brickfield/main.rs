@@ -139,14 +139,16 @@ impl RenderArgs {
         if self.backend != "auto" {
             return Ok(vec![self.backend.parse().map_err(Failure::Backend)?]);
         }
+        if self.adapter.is_some() || self.validation {
+            return Ok(vec![BackendKind::Ash, BackendKind::Wgpu, BackendKind::Cpu]);
+        }
         // A driver in software is slower than the CPU backend: it is for those who ask for it.
-        let is_asked_for = self.adapter.is_some() || self.validation;
-        let has_gpu = |kind: &BackendKind| {
-            let is_gpu = |status: &BackendStatus| matches!(&status.adapters, Ok(a) if a.iter().any(|a| !a.is_software));
-            is_asked_for || backends().iter().any(|status| status.kind == *kind && is_gpu(status))
-        };
-        let gpus = [BackendKind::Ash, BackendKind::Wgpu].into_iter().filter(has_gpu);
-        Ok(gpus.chain([BackendKind::Cpu]).collect())
+        let is_gpu = |status: &BackendStatus| matches!(&status.adapters, Ok(a) if a.iter().any(|a| !a.is_software));
+        let mut kinds: Vec<_> = backends().iter().filter(|status| is_gpu(status)).map(|status| status.kind).collect();
+        // `backends` lists ash last; here it comes first.
+        kinds.reverse();
+        kinds.push(BackendKind::Cpu);
+        Ok(kinds)
     }
 
     fn validation(&self) -> Validation {
