@@ -96,7 +96,7 @@ impl Scene {
         // An address in a `Weak` is not used again while the `Weak` lives.
         if !std::ptr::eq(held.as_ptr(), Arc::as_ptr(occupancy)) {
             *held = Weak::new();
-            let bytes = occupancy.distances();
+            let bytes = bytemuck::cast_slice(occupancy.distances());
             staging.fill(queue, &[(slot.reserve(&self.device, bytes.len())?, bytes)])?;
             *held = Arc::downgrade(occupancy);
         }

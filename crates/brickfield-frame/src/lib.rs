@@ -3,6 +3,7 @@
 mod backend;
 mod beams;
 mod brick_set;
+mod chebyshev;
 mod feature;
 mod index;
 mod macrocells;

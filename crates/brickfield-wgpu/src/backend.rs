@@ -234,7 +234,7 @@ impl Scene {
         // An address in a `Weak` is not used again while the `Weak` lives.
         if !std::ptr::eq(held.as_ptr(), Arc::as_ptr(occupancy)) {
             *held = Weak::new();
-            buffer.write(device, occupancy.distances())?;
+            buffer.write(device, bytemuck::cast_slice(occupancy.distances()))?;
             *held = Arc::downgrade(occupancy);
         }
         Ok(())

@@ -5,7 +5,7 @@ use brickfield_frame::MACROCELL_SIDE;
 use super::brick::{LANES, Lanes, Nodes, at_most};
 
 /// Distances from which on a leap reaches beyond a batch of short steps.
-const FAR: u8 = 3;
+const FAR: i8 = 5;
 
 /// Tells which segments of a ray inside one brick see nothing.
 pub(super) struct Sieve<'a, const N: usize> {
@@ -13,15 +13,15 @@ pub(super) struct Sieve<'a, const N: usize> {
     nodes: Nodes,
     /// Distance between the rule's nodes, in segments.
     far: f32,
-    /// Distances of the brick's macrocells to the nearest visible one.
-    distances: &'a [u8],
+    /// Distances of the brick's macrocells to the nearest that is not like them; negative for visible ones.
+    distances: &'a [i8],
 }
 
 impl<'a, const N: usize> Sieve<'a, N> {
     const N_MACROCELLS: usize = N / MACROCELL_SIDE as usize;
 
     #[inline(always)]
-    pub(super) fn new(nodes: Nodes, far: f32, distances: &'a [u8]) -> Self {
+    pub(super) fn new(nodes: Nodes, far: f32, distances: &'a [i8]) -> Self {
         Sieve { nodes, far, distances: &distances[..Self::N_MACROCELLS.pow(3)] }
     }
 
@@ -35,7 +35,7 @@ impl<'a, const N: usize> Sieve<'a, N> {
         let near = self.macrocells(&at);
         let distances = self.distances(&near);
         let visible = match self.far {
-            0.0 => bits(|l| distances[l] == 0),
+            0.0 => bits(|l| distances[l] < 0),
             far => {
                 at.iter_mut().for_each(|at| *at += far);
                 pairs(&near, &self.macrocells(&at), &distances)
@@ -51,7 +51,7 @@ impl<'a, const N: usize> Sieve<'a, N> {
 
     /// The distances of macrocells.
     #[inline(always)]
-    fn distances(&self, [x, y, z]: &[[u32; LANES]; 3]) -> [u8; LANES] {
+    fn distances(&self, [x, y, z]: &[[u32; LANES]; 3]) -> [i8; LANES] {
         let n = Self::N_MACROCELLS as u32;
         let mut distances = [0; LANES];
         for l in 0..LANES {
@@ -77,7 +77,7 @@ impl<'a, const N: usize> Sieve<'a, N> {
 
     /// The first segment that is not wholly among the dark macrocells around one; the brick's own faces end it anyway.
     #[inline(always)]
-    fn leaves(&self, macrocell: [u32; 3], distance: u8) -> i32 {
+    fn leaves(&self, macrocell: [u32; 3], distance: i8) -> i32 {
         let side = MACROCELL_SIDE as f32;
         let reach = f32::from(distance) - 0.5;
         let mut exit = f32::MAX;
@@ -95,14 +95,14 @@ impl<'a, const N: usize> Sieve<'a, N> {
 /// Which segments with two nodes may see something: those whose far node is not among the dark macrocells around the near
 /// one. Those are connected, so that the transfer function is 0 between two of their values, too.
 #[inline(always)]
-fn pairs(near: &[[u32; LANES]; 3], far: &[[u32; LANES]; 3], distances: &[u8; LANES]) -> u32 {
+fn pairs(near: &[[u32; LANES]; 3], far: &[[u32; LANES]; 3], distances: &[i8; LANES]) -> u32 {
     let mut apart = [0; LANES];
     for (near, far) in near.iter().zip(far) {
         for l in 0..LANES {
             apart[l] = near[l].abs_diff(far[l]).max(apart[l]);
         }
     }
-    bits(|l| u32::from(distances[l]) <= apart[l])
+    bits(|l| i32::from(distances[l]) <= apart[l] as i32)
 }
 
 /// One bit for each lane.

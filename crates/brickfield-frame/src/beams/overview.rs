@@ -2,9 +2,8 @@
 
 use brickfield_core::BrickSide;
 use brickfield_core::glam::{UVec3, Vec3A};
-use rayon::prelude::*;
 
-use crate::{IndexEntry, IndexGrid, MACROCELL_SIDE, Occupancy};
+use crate::{IndexEntry, IndexGrid, MACROCELL_SIDE, Occupancy, chebyshev};
 
 /// Most cells of a lattice: 128^3.
 const MAX_CELLS: usize = 1 << 21;
@@ -74,7 +73,7 @@ impl Overview {
         let edges = n_cells.to_array().map(|n| edges(&lattice, n));
         let mut overview = Overview { n_cells, distances: vec![FARTHEST; total(n_cells)], edges, lattice };
         overview.mark(index, occupancy);
-        overview.spread();
+        chebyshev::spread(&mut overview.distances, n_cells.to_array().map(|n| n as usize), FARTHEST);
         Some(overview)
     }
 
@@ -101,7 +100,7 @@ impl Overview {
             return self.mark_box(corner, corner + self.lattice.n_brick * stride);
         };
         let n = self.lattice.n_macrocells;
-        for (i, _) in occupancy.brick(slot).iter().enumerate().filter(|(_, d)| **d == 0) {
+        for (i, _) in occupancy.brick(slot).iter().enumerate().filter(|(_, d)| **d < 0) {
             let i = i as u32;
             let at = UVec3::new(i % n, i / n % n, i / n / n);
             let low = at * MACROCELL_SIDE;
@@ -120,27 +119,6 @@ impl Overview {
                 let row = ((z * self.n_cells.y + y) * self.n_cells.x) as usize;
                 self.distances[row + low.x as usize..row + high.x as usize].fill(0);
             }
-        }
-    }
-
-    /// From 0 (may show) and `FARTHEST` to distances: along x, then the greater of what that found and the way along y, then z.
-    fn spread(&mut self) {
-        let [nx, ny, nz] = self.n_cells.to_array().map(|n| n as usize);
-        self.distances.par_chunks_mut(nx).for_each(along_row);
-        for (stride, n) in [(1, ny), (ny, nz)] {
-            let before = self.distances.clone();
-            self.distances.par_chunks_mut(nx).enumerate().for_each(|(row, out)| {
-                let at = row / stride % n;
-                let of = |other: usize| &before[(row + other * stride - at * stride) * nx..][..nx];
-                for way in 1..usize::from(FARTHEST) {
-                    if way <= at {
-                        nearer(out, of(at - way), way as u8);
-                    }
-                    if at + way < n {
-                        nearer(out, of(at + way), way as u8);
-                    }
-                }
-            });
         }
     }
 
@@ -172,21 +150,4 @@ impl Overview {
 
 fn edges(lattice: &Lattice, n: u32) -> Vec<f32> {
     (0..=n).map(|cell| lattice.edge(cell) as f32).collect()
-}
-
-/// Distances along a row of 0 (may show) and `FARTHEST`.
-fn along_row(row: &mut [u8]) {
-    let closer = |last: &mut u8, d: &mut u8| {
-        *d = (*d).min(*last + 1).min(FARTHEST);
-        *last = *d;
-    };
-    let mut last = FARTHEST;
-    row.iter_mut().for_each(|d| closer(&mut last, d));
-    last = FARTHEST;
-    row.iter_mut().rev().for_each(|d| closer(&mut last, d));
-}
-
-/// What a row `way` rows away says of this one.
-fn nearer(out: &mut [u8], other: &[u8], way: u8) {
-    out.iter_mut().zip(other).for_each(|(d, o)| *d = (*d).min((*o).max(way)));
 }
