@@ -87,7 +87,7 @@ mod tests {
         let n = Occupancy::n_macrocells(side);
         let cells: Vec<UVec3> = (0..n * n * n).map(|i| UVec3::new(i % n, i / n % n, i / n / n)).collect();
         // Few visible ones in the first brick, few dark ones in the second.
-        let rare = |c: &UVec3| (c.x * 31 + c.y * 17 + c.z * 7) % 97 == 0;
+        let rare = |c: &UVec3| (c.x * 31 + c.y * 17 + c.z * 7).is_multiple_of(97);
         let visible: Vec<bool> = [true, false].iter().flat_map(|v| cells.iter().map(move |c| rare(c) == *v)).collect();
         let map = Occupancy::new(side, &visible).unwrap();
         for (slot, visible) in visible.chunks(cells.len()).enumerate() {
