@@ -6,6 +6,7 @@ mod detached;
 #[cfg(feature = "dicom")]
 pub mod dicom;
 mod error;
+mod even;
 mod file_list;
 mod files;
 mod format;

@@ -14,6 +14,8 @@ pub enum Note {
     /// Slices that are not evenly spaced. `positions` are the distances from the first slice along the stack, in
     /// world units; the grid has the median step, and voxels are as in the file.
     UnevenSpacing { positions: Vec<f64>, min_step: f64, median_step: f64, max_step: f64, max_shift: f64 },
+    /// Slices that are not evenly spaced, resampled linearly onto even ones ([`Opened::evenly_spaced`](crate::Opened::evenly_spaced)).
+    EvenSlices { n_slices: usize, min_step: f64, max_step: f64, n_even: usize, step: f64 },
     /// The slices are sheared against their normal. The grid honours it: its third direction is not the normal.
     GantryTilt { degrees: f64 },
     /// The file has several arrays (channels, data sets); one was read.
@@ -55,6 +57,10 @@ impl fmt::Display for Note {
                 f,
                 "{} slices are unevenly spaced, by {min_step:.4} to {max_step:.4}; the median {median_step:.4} is used, which puts them up to {max_shift:.4} out of place",
                 positions.len()
+            ),
+            Note::EvenSlices { n_slices, min_step, max_step, n_even, step } => write!(
+                f,
+                "{n_slices} slices are unevenly spaced, by {min_step:.4} to {max_step:.4}; they were resampled onto {n_even}, {step:.4} apart"
             ),
             Note::GantryTilt { degrees } => write!(f, "gantry tilt of {degrees:.2} degrees; the grid is sheared by it"),
             Note::SeveralArrays { kept, n_arrays } => write!(f, "one of {n_arrays} arrays was read: {kept:?}"),

@@ -15,6 +15,8 @@ use palette::{LinSrgb, Srgb};
 pub enum PictureError {
     #[error("{}: pictures are written as .exr or .png", path.display())]
     Format { path: PathBuf },
+    #[error("{}: there is no folder {}", path.display(), folder.display())]
+    NoFolder { path: PathBuf, folder: PathBuf },
     #[error("{}: {source}", path.display())]
     Io { path: PathBuf, source: std::io::Error },
     #[error("{}: {source}", path.display())]
@@ -44,6 +46,23 @@ impl PictureFormat {
             _ => Err(PictureError::Format { path: path.to_owned() }),
         }
     }
+}
+
+/// Whether a picture could be written: before the work of making it is done.
+///
+/// # Errors
+/// An unknown extension, or no folder that could hold it.
+pub fn check_picture_path(path: &Path) -> Result<(), PictureError> {
+    PictureFormat::of(path)?;
+    let folder = folder_of(path);
+    if folder.is_dir() {
+        return Ok(());
+    }
+    Err(PictureError::NoFolder { path: path.to_owned(), folder: folder.to_owned() })
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Writes a picture in the format of the path's extension; EXR files carry `attributes`, PNG shows `background` behind.
@@ -111,9 +130,9 @@ fn atomically(
     path: &Path,
     write: impl FnOnce(&mut std::io::BufWriter<&std::fs::File>) -> Result<(), PictureError>,
 ) -> Result<(), PictureError> {
-    let io = |source| PictureError::Io { path: path.to_owned(), source };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = tempfile::Builder::new().prefix(".brickfield").tempfile_in(folder).map_err(io)?;
+    // By kind only: tempfile's own text names a file that nobody asked for.
+    let io = |source: std::io::Error| PictureError::Io { path: path.to_owned(), source: source.kind().into() };
+    let file = tempfile::Builder::new().prefix(".brickfield").tempfile_in(folder_of(path)).map_err(io)?;
     let mut writer = std::io::BufWriter::new(file.as_file());
     write(&mut writer)?;
     writer.flush().and_then(|()| writer.stream_position()).map_err(io)?;
@@ -171,5 +190,7 @@ mod tests {
         let error = |path: &str| write_picture(Path::new(path), &image(), [0.0; 3], &[]).unwrap_err().to_string();
         assert_eq!(error("a.jpg"), "a.jpg: pictures are written as .exr or .png");
         assert!(error("no/such/folder/a.png").starts_with("no/such/folder/a.png: "));
+        let early = check_picture_path(Path::new("no/such/a.png")).unwrap_err().to_string();
+        assert_eq!(early, "no/such/a.png: there is no folder no/such");
     }
 }

@@ -1,5 +1,6 @@
 //! Cameras by name or by numbers, fitted to a volume.
 
+use std::ops::Range;
 use std::str::FromStr;
 
 use brickfield_core::glam::{DVec3, UVec2};
@@ -47,19 +48,21 @@ enum Side {
 #[allow(missing_docs)]
 pub enum ViewpointError {
     #[error(
-        "camera: {word:?} is neither a view (oblique, front, back, left, right, top, bottom) nor from=, eye=, target=, up=, fov=, height=, zoom="
+        "{word:?} is neither a view (oblique, front, back, left, right, top, bottom) nor from=, eye=, target=, up=, fov=, height=, zoom="
     )]
     Word { word: String },
-    #[error("camera: {field}={value:?} is not three numbers X,Y,Z")]
+    #[error("{field}={value:?} is not three finite numbers X,Y,Z")]
     Vector { field: String, value: String },
-    #[error("camera: {field}={value:?} is not a number above 0")]
-    Number { field: String, value: String },
-    #[error("camera: {first} and {second} exclude each other")]
+    #[error("{field}={value:?} is not {expected}")]
+    Number { field: String, value: String, expected: &'static str },
+    #[error("{first} and {second} exclude each other")]
     Both { first: &'static str, second: &'static str },
 }
 
 /// Vertical field of view where none is asked for, in degrees.
 const FOV_DEGREES: f64 = 30.0;
+/// Beyond it the eye stands at the target, as far as its numbers can tell.
+const MAX_ZOOM: f64 = 1e6;
 /// How much larger than the volume the picture is.
 const MARGIN: f64 = 1.04;
 
@@ -75,9 +78,13 @@ impl FromStr for Viewpoint {
                 Some(("eye", value)) => v.eye = Some(vector("eye", value)?),
                 Some(("target", value)) => v.target = Some(vector("target", value)?),
                 Some(("up", value)) => v.up = Some(vector("up", value)?),
-                Some(("fov", value)) => v.fov_degrees = Some(positive("fov", value)?),
-                Some(("height", value)) => v.height = Some(positive("height", value)?),
-                Some(("zoom", value)) => v.zoom = Some(positive("zoom", value)?),
+                Some(("fov", value)) => {
+                    v.fov_degrees = Some(number("fov", value, 0.0..180.0, "above 0 and below 180 degrees")?)
+                }
+                Some(("height", value)) => {
+                    v.height = Some(number("height", value, 0.0..f64::INFINITY, "a finite number above 0")?)
+                }
+                Some(("zoom", value)) => v.zoom = Some(number("zoom", value, 0.0..MAX_ZOOM, "above 0 and below 1e6")?),
                 Some(_) => return Err(ViewpointError::Word { word: word.to_owned() }),
             }
         }
@@ -184,14 +191,15 @@ fn side(word: &str) -> Result<Side, ViewpointError> {
 fn vector(field: &str, value: &str) -> Result<DVec3, ViewpointError> {
     let numbers: Result<Vec<f64>, _> = value.split(',').map(|n| n.trim().parse::<f64>()).collect();
     match numbers.as_deref() {
-        Ok([x, y, z]) => Ok(DVec3::new(*x, *y, *z)),
+        Ok([x, y, z]) if [x, y, z].iter().all(|n| n.is_finite()) => Ok(DVec3::new(*x, *y, *z)),
         _ => Err(ViewpointError::Vector { field: field.to_owned(), value: value.to_owned() }),
     }
 }
 
-fn positive(field: &str, value: &str) -> Result<f64, ViewpointError> {
-    let number = value.parse::<f64>().ok().filter(|n| n.is_finite() && *n > 0.0);
-    number.ok_or_else(|| ViewpointError::Number { field: field.to_owned(), value: value.to_owned() })
+/// A number inside an open interval.
+fn number(field: &str, value: &str, open: Range<f64>, expected: &'static str) -> Result<f64, ViewpointError> {
+    let number = value.parse::<f64>().ok().filter(|n| open.start < *n && *n < open.end);
+    number.ok_or_else(|| ViewpointError::Number { field: field.to_owned(), value: value.to_owned(), expected })
 }
 
 #[cfg(test)]
@@ -224,7 +232,10 @@ mod tests {
         let error = |text: &str| text.parse::<Viewpoint>().unwrap_err().to_string();
         assert!(error("sideways").contains("sideways"));
         assert!(error("eye=1,2").contains("eye=\"1,2\""));
+        assert!(error("target=NaN,0,0").contains("finite"));
         assert!(error("fov=-3").contains("fov=\"-3\""));
+        assert!(error("fov=500").contains("below 180"));
+        assert!(error("zoom=1e300").contains("below 1e6"));
         assert!(error("fov=30 height=3").contains("exclude"));
         assert!(error("colour=red").contains("colour=red"));
     }

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use brickfield_conformance::compare::{CompareArgs, CompareError, compare, parse, say, short_of};
+use brickfield_conformance::compare::{CompareArgs, compare, parse, say, short_of};
 use brickfield_conformance::report::{Report, absences, table};
 
 fn main() -> ExitCode {
@@ -11,7 +11,7 @@ fn main() -> ExitCode {
         Ok(report) => finish(&args, &report),
         Err(e) => {
             eprintln!("compare: {}", e.to_string().split_whitespace().collect::<Vec<_>>().join(" "));
-            ExitCode::from(if matches!(e, CompareError::Required { .. }) { 3 } else { 1 })
+            ExitCode::from(e.status())
         }
     }
 }

@@ -34,8 +34,6 @@ pub enum CompareError {
     #[error(transparent)]
     Options(#[from] brickfield::options::OptionError),
     #[error(transparent)]
-    Camera(#[from] brickfield::core::CameraError),
-    #[error(transparent)]
     Prepare(#[from] brickfield::PrepareError),
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -43,6 +41,18 @@ pub enum CompareError {
     Required { backend: String, reason: String },
     #[error("no measurement succeeded; the first reason: {reason}")]
     Nothing { reason: String },
+}
+
+impl CompareError {
+    /// The exit status that scripts see: 1 failed, 2 unusable arguments, 3 a required backend is absent.
+    pub fn status(&self) -> u8 {
+        match self {
+            CompareError::Options(e) if e.is_usage() => 2,
+            CompareError::Prepare(_) => 2,
+            CompareError::Required { .. } => 3,
+            CompareError::Options(_) | CompareError::Output(_) | CompareError::Nothing { .. } => 1,
+        }
+    }
 }
 
 /// Renders and measures all that `args` ask for, and writes it to the folder that they name.
@@ -97,7 +107,7 @@ fn answer(args: &CompareArgs, exhibit: &Exhibit, output: &Output) -> Result<(Ima
     spinner.enable_steady_tick(Duration::from_millis(200));
     let options = ContinuousOptions { tolerance: 1e-9, transmittance_floor: 1e-12 };
     let clip = subject::clip_in_sample_space(exhibit);
-    let answer = continuous(&exhibit.volume, &scene.transfer, &scene.camera, scene.size, &clip, &options);
+    let answer = continuous(&exhibit.subject.volume, &scene.transfer, &scene.camera, scene.size, &clip, &options);
     spinner.finish_and_clear();
     let what = "the continuous integral in f64: rays split at cell faces and knots, error-controlled quadrature";
     let files = output.picture("reference", &answer.image.map(|v| v as f32), args.view.background.0, &[])?;
@@ -137,12 +147,12 @@ fn drivers(backends: &[BackendInfo]) -> String {
 }
 
 fn scene_info(args: &CompareArgs, exhibit: &Exhibit) -> SceneInfo {
-    let (scene, grid): (&Scene, _) = (&exhibit.scene, exhibit.volume.grid());
+    let (scene, grid): (&Scene, _) = (&exhibit.scene, exhibit.subject.volume.grid());
     SceneInfo {
         name: exhibit.name.clone(),
         dims: grid.dims().to_array(),
         spacing: grid.spacing().to_array(),
-        scalar: exhibit.volume.scalar_type().name().to_owned(),
+        scalar: exhibit.subject.volume.scalar_type().name().to_owned(),
         size: scene.size.to_array(),
         eye: scene.camera.eye().to_array(),
         forward: scene.camera.forward().to_array(),

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use brickfield::BackendKind;
 use brickfield::frame::Mode;
 use brickfield::optics::QuadratureRule;
-use brickfield::options::{InputOptions, TreeOptions, ViewOptions};
+use brickfield::options::{InputOptions, TreeOptions, ViewOptions, values};
 use clap::builder::ArgPredicate;
 use clap::parser::ValueSource;
 use clap::{CommandFactory, FromArgMatches, Parser};
@@ -31,14 +31,14 @@ pub struct CompareArgs {
     pub out: PathBuf,
     /// Steps in units of the least voxel spacing, as decimals or fractions; by default 2 to 1/4 in fast mode, 2 to 1/8 or
     /// 1/16 (by the rule's order) in exact mode, and on until the best rule's RMSE is below 1e-5
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = step)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::step)]
     pub steps: Vec<f64>,
     /// Quadrature rules
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = rule,
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::rule,
           default_value = "left-riemann,left-exponential,midpoint,pre-integrated,gauss2")]
     pub rules: Vec<QuadratureRule>,
     /// Modes
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = mode, default_value = "exact,fast")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::mode, default_value = "exact,fast")]
     pub modes: Vec<Mode>,
     /// Backends to compare
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "cpu,wgpu,ash")]
@@ -50,10 +50,10 @@ pub struct CompareArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub require: Vec<BackendKind>,
     /// RMSE that the exact mode of every backend must come below (else status 4)
-    #[arg(long, value_name = "RMSE", value_parser = positive)]
+    #[arg(long, value_name = "RMSE", value_parser = values::positive)]
     pub reach: Option<f64>,
     /// Seconds that the comparison may take; by default 100 for the phantom, 300 for a file
-    #[arg(long, value_parser = positive)]
+    #[arg(long, value_parser = values::positive)]
     pub seconds: Option<f64>,
     /// Most timed frames of each measurement, after one that warms up
     #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..))]
@@ -81,7 +81,7 @@ pub struct CompareArgs {
 /// What clap says, to be printed by its `exit`.
 pub fn parse(arguments: Vec<OsString>) -> Result<CompareArgs, clap::Error> {
     let words = arguments.iter().skip(1).map(|a| quoted(&a.to_string_lossy()));
-    let command = std::iter::once("compare".to_owned()).chain(words).collect::<Vec<_>>().join(" ");
+    let command = std::iter::once("cargo xtask compare".to_owned()).chain(words).collect::<Vec<_>>().join(" ");
     // Small enough that fine steps end in time; all rows of a report share one size.
     let size = |a: clap::Arg| {
         let a = a.help("Size of the picture in pixels; of a file 256x256 unless stated");
@@ -95,31 +95,11 @@ pub fn parse(arguments: Vec<OsString>) -> Result<CompareArgs, clap::Error> {
 
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./,=:".contains(c);
-    if !word.is_empty() && word.chars().all(plain) { word.to_owned() } else { format!("'{word}'") }
-}
-
-fn step(text: &str) -> Result<f64, String> {
-    let number = |t: &str| t.trim().parse::<f64>().ok();
-    let value = match text.split_once('/') {
-        Some((a, b)) => number(a).zip(number(b)).map(|(a, b)| a / b),
-        None => number(text),
-    };
-    value
-        .filter(|v| v.is_finite() && *v > 0.0)
-        .ok_or_else(|| "a step is a number above 0, or a fraction: 1/8".to_owned())
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0).ok_or_else(|| "a number above 0".to_owned())
-}
-
-fn rule(text: &str) -> Result<QuadratureRule, String> {
-    let names = || QuadratureRule::ALL.map(|r| r.name()).join(", ");
-    QuadratureRule::from_name(text).ok_or_else(|| format!("one of {}", names()))
-}
-
-fn mode(text: &str) -> Result<Mode, String> {
-    [Mode::Exact, Mode::FAST].into_iter().find(|m| m.name() == text).ok_or_else(|| "exact or fast".to_owned())
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
 }
 
 #[cfg(test)]
@@ -144,7 +124,8 @@ mod tests {
         let a = args("x.vti --steps 1,0.5,1/8 --rules gauss2 --modes fast --backends ash,cpu --size 64x32").unwrap();
         assert_eq!(a.steps, [1.0, 0.5, 0.125]);
         assert_eq!((a.rules[0], a.backends[1], a.view.size.y), (QuadratureRule::Gauss2, BackendKind::Cpu, 32));
-        assert!(a.command.starts_with("compare x.vti --steps 1,0.5,1/8"));
+        assert!(a.command.starts_with("cargo xtask compare x.vti --steps 1,0.5,1/8"));
+        assert_eq!(quoted("it's front"), r"'it'\''s front'");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use brickfield::Scene;
 use brickfield::core::glam::DVec3;
-use brickfield::core::{Aabb, Camera, Projection, Volume};
+use brickfield::core::{Aabb, Camera, Projection};
 use brickfield::io::WorldFrame;
 use brickfield::options::Subject;
 
@@ -12,7 +12,6 @@ use crate::volumes::{Phantom, phantom};
 /// A volume, ready to be rendered, and its scene (steps, rules and modes vary).
 pub(super) struct Exhibit {
     pub(super) name: String,
-    pub(super) volume: Volume,
     pub(super) subject: Subject,
     pub(super) scene: Scene,
 }
@@ -20,13 +19,10 @@ pub(super) struct Exhibit {
 pub(super) fn exhibit(args: &CompareArgs) -> Result<Exhibit, CompareError> {
     match &args.file {
         Some(path) => {
-            let opened = args.input.open(path)?;
-            opened.notes.iter().for_each(|note| eprintln!("note: {note}"));
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-            let transfer = args.view.transfer(&opened.volume)?;
-            let subject = Subject { frame: opened.frame, tree: args.tree.build(&opened.volume)?, transfer };
-            let scene = scene(args, &subject)?;
-            Ok(Exhibit { name, volume: opened.volume, subject, scene })
+            let subject = Subject::open(path, &args.input, &args.tree, &args.view)?;
+            let scene = args.view.scene(&subject)?;
+            Ok(Exhibit { name, subject, scene })
         }
         None => of_phantom(args),
     }
@@ -36,18 +32,12 @@ pub(super) fn exhibit(args: &CompareArgs) -> Result<Exhibit, CompareError> {
 fn of_phantom(args: &CompareArgs) -> Result<Exhibit, CompareError> {
     let Phantom { volume, transfer, camera } = phantom();
     let transfer = if args.view.transfer == "auto" { transfer } else { args.view.transfer(&volume)? };
-    let subject = Subject { frame: WorldFrame::Lps, tree: args.tree.build(&volume)?, transfer };
-    let mut scene = scene(args, &subject)?;
+    let subject = Subject { frame: WorldFrame::Lps, tree: args.tree.build(&volume)?, transfer, volume };
+    let mut scene = args.view.scene(&subject)?;
     if args.default_camera {
         scene.camera = camera;
     }
-    Ok(Exhibit { name: "phantom".to_owned(), volume, subject, scene })
-}
-
-fn scene(args: &CompareArgs, subject: &Subject) -> Result<Scene, CompareError> {
-    let view = &args.view;
-    let camera = view.camera.camera(subject.tree.grid(), subject.frame, view.size)?;
-    Ok(Scene { detail: view.lod, clip: view.clip, ..Scene::new(camera, view.size, subject.transfer.clone()) })
+    Ok(Exhibit { name: "phantom".to_owned(), subject, scene })
 }
 
 /// The scene's clip box (index space) in sample space; without one, all space.

@@ -74,7 +74,7 @@ pub struct SceneInfo {
     pub transfer: brickfield_core::TransferFunction,
     /// Linear RGB behind the picture; colour differences and PNG files are over it.
     pub background: [f64; 3],
-    /// The options of the command, so that it can be run again.
+    /// The command, as a shell takes it.
     pub command: String,
 }
 

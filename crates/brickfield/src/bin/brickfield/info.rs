@@ -1,53 +1,60 @@
 //! `brickfield info`.
 
+use std::fmt::{self, Write};
+
 use brickfield::bricks::{BrickTree, LevelMemory};
+use brickfield::core::glam::DVec3;
 use brickfield::core::{Level, Volume};
 use brickfield::io::Opened;
 
-use crate::{Failure, InfoArgs};
+use crate::{Failure, InfoArgs, print};
 
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let opened = args.input.open(&args.file)?;
-    print_volume(&opened);
-    print_tree(&args.tree.build(&opened.volume)?);
-    Ok(())
+    let tree = args.tree.build(&opened.volume)?;
+    let mut text = String::new();
+    of_volume(&mut text, &opened)?;
+    of_tree(&mut text, &tree)?;
+    print(&text)
 }
 
-fn print_volume(opened: &Opened) {
+fn of_volume(text: &mut String, opened: &Opened) -> fmt::Result {
     let volume: &Volume = &opened.volume;
     let (grid, range) = (volume.grid(), volume.range());
-    let (dims, spacing) = (grid.dims(), grid.spacing());
+    let (dims, spacing) = (grid.dims(), nine_digits(grid.spacing()));
     let world = grid.world_box();
-    println!("format      {}", opened.format);
-    println!("dimensions  {} x {} x {}", dims.x, dims.y, dims.z);
-    println!("type        {}", volume.scalar_type());
-    println!("values      {} to {}", range.min, range.max);
+    writeln!(text, "format      {}", opened.format)?;
+    writeln!(text, "dimensions  {} x {} x {}", dims.x, dims.y, dims.z)?;
+    writeln!(text, "type        {}", volume.scalar_type())?;
+    writeln!(text, "values      {} to {}", range.min, range.max)?;
     let unit = opened.unit.as_deref().unwrap_or("units");
-    println!("spacing     {} x {} x {} {unit}", spacing.x, spacing.y, spacing.z);
-    println!("world       {} to {} ({:?})", world.min, world.max, opened.frame);
-    for note in &opened.notes {
-        println!("note        {note}");
-    }
+    writeln!(text, "spacing     {} x {} x {} {unit}", spacing.x, spacing.y, spacing.z)?;
+    writeln!(text, "world       {} to {} ({:?})", nine_digits(world.min), nine_digits(world.max), opened.frame)?;
+    opened.notes.iter().try_for_each(|note| writeln!(text, "note        {note}"))
 }
 
-fn print_tree(tree: &BrickTree) {
-    println!("bricks of {}^3 samples ({:?})", tree.layout().side(), tree.downsampling());
-    println!("level  dimensions         bricks      stored MiB  shared MiB");
+/// Lengths without the last digits, which rounding leaves behind.
+fn nine_digits(v: DVec3) -> DVec3 {
+    DVec3::from(v.to_array().map(|x| format!("{x:.8e}").parse().unwrap_or(x)))
+}
+
+fn of_tree(text: &mut String, tree: &BrickTree) -> fmt::Result {
+    writeln!(text, "bricks of {}^3 samples ({:?})", tree.layout().side(), tree.downsampling())?;
+    writeln!(text, "level  dimensions         bricks      stored MiB  shared MiB")?;
     let memory = tree.memory();
-    for (level, memory) in (0..).map(Level).zip(&memory.levels) {
-        print_level(tree, level, memory);
-    }
+    (0..).map(Level).zip(&memory.levels).try_for_each(|(level, memory)| of_level(text, tree, level, memory))
 }
 
-fn print_level(tree: &BrickTree, level: Level, memory: &LevelMemory) {
+fn of_level(text: &mut String, tree: &BrickTree, level: Level, memory: &LevelMemory) -> fmt::Result {
     let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let d = tree.layout().level_dims(level);
     let dims = format!("{} x {} x {}", d.x, d.y, d.z);
-    println!(
+    writeln!(
+        text,
         "{:5}  {dims:17}  {:10}  {:10.2}  {:10.2}",
         level.0,
         memory.n_bricks,
         mib(memory.stored_bytes),
         mib(memory.shared_bytes)
-    );
+    )
 }

@@ -3,11 +3,12 @@
 mod info;
 mod render;
 
+use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use brickfield::options::{InputOptions, SamplingOptions, TreeOptions, ViewOptions};
-use brickfield::{BackendKind, BackendStatus, Validation, backends};
+use brickfield::options::{InputOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions};
+use brickfield::{AdapterInfo, BackendError, BackendKind, BackendStatus, Validation, backends};
 use clap::{Args, Parser, Subcommand};
 
 /// Renders scalar volumes by multiresolution bricks, on the CPU, through wgpu and through raw Vulkan.
@@ -76,17 +77,39 @@ struct RenderArgs {
 
 /// Why the command failed, by exit status.
 enum Failure {
+    /// Status 2.
+    Usage(Box<dyn std::error::Error>),
     /// Status 3.
-    Backend(brickfield::BackendError),
+    Backend(BackendError),
     /// Status 1: the picture was written, but the validation layer had something to say.
     Validation { n_messages: usize },
     /// Status 1.
     Other(Box<dyn std::error::Error>),
 }
 
+impl Failure {
+    fn usage(e: impl std::error::Error + 'static) -> Failure {
+        Failure::Usage(Box::new(e))
+    }
+
+    /// The line for standard error, and the exit status.
+    fn told(&self) -> (String, u8) {
+        match self {
+            Failure::Usage(e) => (e.to_string(), 2),
+            Failure::Backend(e) => (e.to_string(), 3),
+            Failure::Validation { n_messages } => (format!("messages from the validation layer: {n_messages}"), 1),
+            Failure::Other(e) => (e.to_string(), 1),
+        }
+    }
+}
+
 impl<E: std::error::Error + 'static> From<E> for Failure {
     fn from(e: E) -> Failure {
-        Failure::Other(Box::new(e))
+        let e: Box<dyn std::error::Error> = Box::new(e);
+        match e.downcast_ref::<OptionError>().is_some_and(OptionError::is_usage) {
+            true => Failure::Usage(e),
+            false => Failure::Other(e),
+        }
     }
 }
 
@@ -94,50 +117,39 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Info(args) => info::run(&args),
         Command::Render(args) => render::run(&args),
-        Command::Backends => {
-            print_backends();
-            Ok(())
-        }
+        Command::Backends => print(&listed_backends()),
     };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(Failure::Backend(e)) => {
-            eprintln!("brickfield: {e}");
-            ExitCode::from(3)
-        }
-        Err(Failure::Validation { n_messages }) => {
-            eprintln!("brickfield: {n_messages} messages from the validation layer");
-            ExitCode::FAILURE
-        }
-        Err(Failure::Other(e)) => {
-            eprintln!("brickfield: {}", one_line(&e.to_string()));
-            ExitCode::FAILURE
-        }
+    let Err(failure) = result else { return ExitCode::SUCCESS };
+    let (message, status) = failure.told();
+    eprintln!("brickfield: {}", message.split_whitespace().collect::<Vec<_>>().join(" "));
+    ExitCode::from(status)
+}
+
+/// Prints to a reader who may have had enough.
+fn print(text: &str) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
+        other => Ok(other?),
     }
 }
 
-fn one_line(message: &str) -> String {
-    message.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-fn print_backends() {
-    for status in brickfield::backends() {
-        match status.adapters {
-            Ok(adapters) => {
-                for a in adapters {
-                    println!("{:5} {}: {} ({})", status.kind.name(), a.index, a.name, a.driver);
-                }
-            }
-            Err(reason) => println!("{:5} absent: {reason}", status.kind.name()),
+fn listed_backends() -> String {
+    let of_status = |status: BackendStatus| match status.adapters {
+        Ok(adapters) => {
+            let line = |a: &AdapterInfo| format!("{:5} {}: {} ({})\n", status.kind.name(), a.index, a.name, a.driver);
+            adapters.iter().map(line).collect()
         }
-    }
+        Err(reason) => format!("{:5} absent: {reason}\n", status.kind.name()),
+    };
+    backends().into_iter().map(of_status).collect()
 }
 
 impl RenderArgs {
     /// The backends to try, in order.
     fn candidates(&self) -> Result<Vec<BackendKind>, Failure> {
         if self.backend != "auto" {
-            return Ok(vec![self.backend.parse().map_err(Failure::Backend)?]);
+            return Ok(vec![self.backend.parse().map_err(Failure::usage)?]);
         }
         if self.adapter.is_some() || self.validation {
             return Ok(vec![BackendKind::Ash, BackendKind::Wgpu, BackendKind::Cpu]);

@@ -2,20 +2,17 @@
 
 use brickfield::frame::{Backend, Frame, FramePlan};
 use brickfield::options::Subject;
-use brickfield::{BackendError, PictureFormat, Residency, Scene, open_backend, prepare, write_picture};
+use brickfield::{BackendError, Residency, Scene, check_picture_path, open_backend, prepare, write_picture};
 
-use crate::{Failure, RenderArgs};
+use crate::{Failure, RenderArgs, print};
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     // What can be refused is refused before any work is done.
-    PictureFormat::of(&args.out)?;
+    check_picture_path(&args.out).map_err(Failure::usage)?;
     let mut backend = open(args)?;
-    let opened = args.input.open(&args.file)?;
-    opened.notes.iter().for_each(|note| eprintln!("note: {note}"));
-    let transfer = args.view.transfer(&opened.volume)?;
-    let subject = Subject { frame: opened.frame, tree: args.tree.build(&opened.volume)?, transfer };
-    let scene = args.view.scene(&subject, &args.sampling)?;
-    let plan = prepare(&subject.tree, &scene, &mut Residency::default())?;
+    let subject = Subject::open(&args.file, &args.input, &args.tree, &args.view)?;
+    let scene = args.sampling.of(args.view.scene(&subject)?);
+    let plan = prepare(&subject.tree, &scene, &mut Residency::default()).map_err(Failure::usage)?;
     if plan.visible.is_empty() {
         eprintln!(
             "note: nothing is visible: the transfer function is 0 over all values inside the clip box and the view"
@@ -24,7 +21,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let frame = backend.render(&plan)?;
     let attributes = attributes(args, backend.as_ref(), &scene);
     write_picture(&args.out, &frame.image, args.view.background.0, &attributes)?;
-    print_summary(backend.as_ref(), &plan, &frame);
+    print(&summary(backend.as_ref(), &plan, &frame))?;
     check_validation(&backend.validation_messages())
 }
 
@@ -55,11 +52,19 @@ fn attributes(args: &RenderArgs, backend: &dyn Backend, scene: &Scene) -> Vec<(&
     ]
 }
 
-fn print_summary(backend: &dyn Backend, plan: &FramePlan, frame: &Frame) {
+fn summary(backend: &dyn Backend, plan: &FramePlan, frame: &Frame) -> String {
     let d = backend.describe();
     let t = frame.timing;
     let device = t.device_ms.map(|ms| format!(", device {ms:.1} ms")).unwrap_or_default();
-    println!("{}: {} ({})", d.backend, d.adapter, d.driver);
-    println!("{} bricks, {:.1} MiB", plan.bricks.n_bricks(), plan.bricks.bytes().len() as f64 / f64::from(1 << 20));
-    println!("upload {:.1} ms, render {:.1} ms{device}, read back {:.1} ms", t.upload_ms, t.wall_ms, t.read_back_ms);
+    let mib = plan.bricks.bytes().len() as f64 / f64::from(1 << 20);
+    format!(
+        "{}: {} ({})\n{} bricks, {mib:.1} MiB\nupload {:.1} ms, render {:.1} ms{device}, read back {:.1} ms\n",
+        d.backend,
+        d.adapter,
+        d.driver,
+        plan.bricks.n_bricks(),
+        t.upload_ms,
+        t.wall_ms,
+        t.read_back_ms
+    )
 }

@@ -1,0 +1,268 @@
+//! The options that the `brickfield` command shares with the conformance runs.
+
+pub mod values;
+
+use std::path::{Path, PathBuf};
+
+use brickfield_bricks::{BrickTree, BuildOptions, Downsampling, build_tree_observed};
+use brickfield_core::glam::{UVec2, UVec3};
+use brickfield_core::{Aabb, BrickSide, Grid, Level, LinearRgb, TransferFunction, Volume};
+use brickfield_frame::Mode;
+use brickfield_io::{Limits, OpenError, Opened, RawSpec, WorldFrame};
+use brickfield_lod::Criterion;
+use brickfield_optics::QuadratureRule;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::{Scene, Skipping, Viewpoint};
+
+/// How a file is read.
+#[derive(Args, Clone, Debug)]
+pub struct InputOptions {
+    /// Most bytes that the voxels may take, in MiB
+    #[arg(long, value_name = "MIB", default_value_t = Limits::default().max_bytes >> 20,
+          value_parser = clap::value_parser!(u64).range(1..1 << 43))]
+    pub max_mib: u64,
+    /// Read FILE as raw voxels: `NXxNYxNZ,TYPE` with TYPE u8 to f64; then, each if needed, `,big` `,skip=BYTES`
+    /// `,spacing=SX:SY:SZ`
+    #[arg(long, value_name = "SPEC", value_parser = values::raw_spec)]
+    pub raw: Option<RawSpec>,
+}
+
+/// How the octree is built.
+#[derive(Args, Clone, Debug)]
+pub struct TreeOptions {
+    /// Samples along a brick's side: 16, 32 or 64
+    #[arg(long, value_name = "N", default_value = "32", value_parser = values::brick_side)]
+    pub brick: BrickSide,
+    /// How coarser levels come about: subsample (sharper) or average (no aliasing)
+    #[arg(long, value_name = "HOW", default_value = "subsample", value_parser = values::downsampling)]
+    pub downsampling: Downsampling,
+}
+
+/// What of a volume is shown, and how.
+#[derive(Args, Clone, Debug)]
+pub struct ViewOptions {
+    /// Size of the picture in pixels
+    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = values::size)]
+    pub size: UVec2,
+    /// Where the picture is taken from: oblique, front, back, left, right, top, bottom, and/or fields:
+    /// from=X,Y,Z eye=X,Y,Z target=X,Y,Z up=X,Y,Z (world units), fov=DEGREES or height=UNITS (orthographic), zoom=FACTOR
+    #[arg(long, value_name = "VIEW", default_value = "oblique")]
+    pub camera: Viewpoint,
+    /// Transfer function: "auto" (from the histogram), a preset's name, or a JSON or TOML file
+    #[arg(long, value_name = "TF", default_value = "auto")]
+    pub transfer: String,
+    /// Which resolution: "full", a level (0 is the finest), or "distance[=FACTOR]" (finer the nearer)
+    #[arg(long, value_name = "LOD", default_value = "full", value_parser = values::detail)]
+    pub lod: Criterion,
+    /// Show only a part, in voxels: X0:X1,Y0:Y1,Z0:Z1
+    #[arg(long, value_name = "BOX", value_parser = values::clip)]
+    pub clip: Option<Aabb>,
+    /// Background behind the picture in PNG files, linear: R,G,B or one number for grey
+    #[arg(long, value_name = "RGB", default_value = "0", value_parser = values::background)]
+    pub background: Background,
+}
+
+/// A linear background colour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Background(pub LinearRgb);
+
+/// How rays are sampled.
+#[derive(Args, Clone, Debug)]
+pub struct SamplingOptions {
+    /// exact (f32 arithmetic, held to the reference) or fast (hardware filter, early end of rays)
+    #[arg(long, default_value = "exact", value_parser = values::mode)]
+    pub mode: Mode,
+    /// Distance between samples, in units of the least voxel spacing, as a decimal or a fraction
+    #[arg(long, value_name = "VOXELS", default_value_t = 0.5, value_parser = values::step, allow_hyphen_values = true)]
+    pub step: f64,
+    /// Quadrature rule: left-riemann, left-exponential, midpoint, pre-integrated or gauss2
+    #[arg(long, default_value = "midpoint", value_parser = values::rule)]
+    pub rule: QuadratureRule,
+    /// Upload and sample transparent bricks too (to measure what leaving them out saves)
+    #[arg(long)]
+    pub no_skip: bool,
+}
+
+/// A volume that is ready to be rendered.
+#[derive(Debug)]
+pub struct Subject {
+    /// The volume.
+    pub volume: Volume,
+    /// What is known of the world's axes.
+    pub frame: WorldFrame,
+    /// Its bricks at all resolutions.
+    pub tree: BrickTree,
+    /// The transfer function that was asked for.
+    pub transfer: TransferFunction,
+}
+
+/// Why options cannot be met.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum OptionError {
+    #[error(transparent)]
+    Open(#[from] brickfield_io::OpenError),
+    #[error(transparent)]
+    Build(#[from] brickfield_bricks::BuildError),
+    #[error("--transfer: {0}")]
+    Preset(#[from] brickfield_core::TransferError),
+    #[error("--transfer: {0}")]
+    Transfer(#[from] brickfield_optics::ReadTransferError),
+    #[error("--transfer: {name:?} is neither auto, nor a file, nor a preset; the presets are {presets}")]
+    NoSuchTransfer { name: String, presets: String },
+    #[error("--camera: {0}")]
+    Camera(#[from] brickfield_core::CameraError),
+    #[error("--clip: the box from {} to {} lies outside of the volume's {} x {} x {} voxels", clip.min, clip.max, dims.x, dims.y, dims.z)]
+    ClipOutside { clip: Aabb, dims: UVec3 },
+}
+
+impl OptionError {
+    /// Whether the command line is to blame, and not a file or the machine.
+    pub fn is_usage(&self) -> bool {
+        match self {
+            OptionError::Open(_) | OptionError::Build(_) | OptionError::Preset(_) | OptionError::Transfer(_) => false,
+            OptionError::NoSuchTransfer { .. } | OptionError::Camera(_) | OptionError::ClipOutside { .. } => true,
+        }
+    }
+}
+
+impl InputOptions {
+    /// Opens a volume as it lies in its file, with a progress display on the terminal.
+    ///
+    /// # Errors
+    /// What the reader says.
+    pub fn open(&self, path: &Path) -> Result<Opened, OptionError> {
+        let bar = spinner(format!("reading {}", path.display()));
+        let opened = match &self.raw {
+            Some(raw) => brickfield_io::open_raw(path, raw, &self.limits()),
+            None => brickfield_io::open(path, &self.limits()),
+        };
+        bar.finish_and_clear();
+        Ok(opened?)
+    }
+
+    fn limits(&self) -> Limits {
+        Limits { max_bytes: self.max_mib.saturating_mul(1 << 20) }
+    }
+}
+
+impl Subject {
+    /// Opens a file and builds its bricks; what the reader noticed is printed. Uneven slices are made even.
+    ///
+    /// # Errors
+    /// What the reader, the transfer function or the builder says.
+    pub fn open(
+        path: &Path,
+        input: &InputOptions,
+        tree: &TreeOptions,
+        view: &ViewOptions,
+    ) -> Result<Subject, OptionError> {
+        let even = |fault| OpenError { path: path.to_owned(), fault };
+        let Opened { volume, frame, notes, .. } = input.open(path)?.evenly_spaced(&input.limits()).map_err(even)?;
+        notes.iter().for_each(|text| note(text));
+        let transfer = view.transfer(&volume)?;
+        Ok(Subject { frame, tree: tree.build(&volume)?, transfer, volume })
+    }
+}
+
+impl TreeOptions {
+    /// Builds the octree, with a progress bar on the terminal.
+    ///
+    /// # Errors
+    /// What the builder says.
+    pub fn build(&self, volume: &Volume) -> Result<BrickTree, OptionError> {
+        let options = BuildOptions { side: self.brick, downsampling: self.downsampling, ..BuildOptions::default() };
+        let bar = progress_bar("building bricks");
+        let tree = build_tree_observed(volume, &options, &|p| {
+            bar.set_length(p.n_total as u64);
+            bar.inc(1);
+        });
+        bar.finish_and_clear();
+        Ok(tree?)
+    }
+}
+
+impl ViewOptions {
+    /// The transfer function that is asked for.
+    ///
+    /// # Errors
+    /// An unknown name, or what is wrong in the file.
+    pub fn transfer(&self, volume: &Volume) -> Result<TransferFunction, OptionError> {
+        if self.transfer == "auto" {
+            return Ok(brickfield_optics::automatic(volume));
+        }
+        if let Some(preset) = brickfield_optics::Preset::from_name(&self.transfer) {
+            return Ok(preset.for_volume(volume)?);
+        }
+        let path = PathBuf::from(&self.transfer);
+        if path.exists() {
+            return Ok(brickfield_optics::read_transfer(&path)?);
+        }
+        let presets = brickfield_optics::Preset::ALL.map(|p| p.name()).join(", ");
+        Err(OptionError::NoSuchTransfer { name: self.transfer.clone(), presets })
+    }
+
+    /// The scene of a volume, sampled as by default; what of the options the volume does not have is printed.
+    ///
+    /// # Errors
+    /// What the camera refuses, or a clip box outside of the volume.
+    pub fn scene(&self, subject: &Subject) -> Result<Scene, OptionError> {
+        let (grid, layout) = (subject.tree.grid(), subject.tree.layout());
+        let camera = self.camera.camera(grid, subject.frame, self.size)?;
+        if let (Criterion::Uniform(Level(level)), Level(root)) = (self.lod, layout.root().level)
+            && level > root
+        {
+            note(&format!("--lod {level}: the volume has levels 0 to {root}; level {root} is shown"));
+        }
+        if let Some(clip) = self.clip {
+            check_clip(clip, grid)?;
+        }
+        Ok(Scene { detail: self.lod, clip: self.clip, ..Scene::new(camera, self.size, subject.transfer.clone()) })
+    }
+}
+
+impl SamplingOptions {
+    /// The scene, sampled as asked for.
+    pub fn of(&self, scene: Scene) -> Scene {
+        Scene {
+            step_voxels: self.step,
+            rule: self.rule,
+            mode: self.mode,
+            skipping: if self.no_skip { Skipping::Off } else { Skipping::On },
+            ..scene
+        }
+    }
+}
+
+/// Refuses a clip box outside of the volume, and says if a part of it is.
+fn check_clip(clip: Aabb, grid: &Grid) -> Result<(), OptionError> {
+    let (volume, dims) = (grid.index_box(), grid.dims());
+    let inside = clip.intersection(&volume);
+    if inside.is_empty() {
+        return Err(OptionError::ClipOutside { clip, dims });
+    }
+    if inside != clip {
+        note(&format!("--clip: the box is cut to the volume's {} x {} x {} voxels", dims.x, dims.y, dims.z));
+    }
+    Ok(())
+}
+
+/// Says what the user ought to know.
+fn note(text: &dyn std::fmt::Display) {
+    eprintln!("note: {text}");
+}
+
+/// A progress bar that shows after the first moments; hidden where there is no terminal.
+pub fn progress_bar(what: &'static str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} [{bar:40}] {percent}% {eta}").expect("a valid template");
+    ProgressBar::new(0).with_style(style.progress_chars("=> ")).with_message(what)
+}
+
+fn spinner(what: String) -> ProgressBar {
+    let bar = ProgressBar::new_spinner().with_message(what);
+    bar.enable_steady_tick(std::time::Duration::from_millis(200));
+    bar
+}

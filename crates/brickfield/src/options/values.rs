@@ -1,0 +1,139 @@
+//! From the text of an option to its value, for clap.
+//! Errors say what the text must be, in a line.
+
+use brickfield_bricks::Downsampling;
+use brickfield_core::glam::{DVec3, UVec2};
+use brickfield_core::{Aabb, BrickSide, Level, ScalarType};
+use brickfield_frame::Mode;
+use brickfield_io::{ByteOrder, RawSpec};
+use brickfield_lod::Criterion;
+use brickfield_optics::QuadratureRule;
+
+use super::Background;
+use crate::MAX_IMAGE;
+
+/// A number above 0.
+pub fn positive(text: &str) -> Result<f64, String> {
+    text.trim()
+        .parse()
+        .ok()
+        .filter(|v: &f64| v.is_finite() && *v > 0.0)
+        .ok_or_else(|| "it must be a finite number above 0".to_owned())
+}
+
+/// A step: a number above 0, or a fraction.
+pub fn step(text: &str) -> Result<f64, String> {
+    let value = match text.split_once('/') {
+        Some((a, b)) => positive(a).and_then(|a| Ok(a / positive(b)?)),
+        None => positive(text),
+    };
+    value
+        .ok()
+        .filter(|v| v.is_finite() && *v > 0.0)
+        .ok_or_else(|| "a step is a finite number above 0, or a fraction: 0.125 or 1/8".to_owned())
+}
+
+fn numbers<const N: usize>(text: &str, separator: char) -> Option<[f64; N]> {
+    let parsed: Result<Vec<f64>, _> = text.split(separator).map(|n| n.trim().parse::<f64>()).collect();
+    parsed.ok()?.try_into().ok().filter(|n: &[f64; N]| n.iter().all(|x| x.is_finite()))
+}
+
+/// The size of a picture.
+pub fn size(text: &str) -> Result<UVec2, String> {
+    let sides: Option<Vec<u32>> = text.split(['x', 'X']).map(|n| n.parse().ok()).collect();
+    match sides.as_deref() {
+        Some([w, h]) if (1..=MAX_IMAGE).contains(w) && (1..=MAX_IMAGE).contains(h) => Ok(UVec2::new(*w, *h)),
+        _ => Err(format!("a size is WIDTHxHEIGHT in pixels, each 1 to {MAX_IMAGE}, for example 512x512")),
+    }
+}
+
+/// A brick's side.
+pub fn brick_side(text: &str) -> Result<BrickSide, String> {
+    let n = text.parse().map_err(|_| "a number: 16, 32 or 64".to_owned())?;
+    BrickSide::new(n).map_err(|e| e.to_string())
+}
+
+/// How coarser levels come about.
+pub fn downsampling(text: &str) -> Result<Downsampling, String> {
+    match text {
+        "subsample" => Ok(Downsampling::Subsample),
+        "average" => Ok(Downsampling::Average),
+        _ => Err("subsample or average".to_owned()),
+    }
+}
+
+/// Which resolution.
+pub fn detail(text: &str) -> Result<Criterion, String> {
+    match text {
+        "full" => return Ok(Criterion::FullResolution),
+        "distance" => return Ok(Criterion::Distance { factor: 1.0 }),
+        _ => {}
+    }
+    if let Some(factor) = text.strip_prefix("distance=") {
+        let factor = factor.parse::<f64>().ok().filter(|f| *f > 0.0);
+        return factor.map(|factor| Criterion::Distance { factor }).ok_or_else(|| "a factor above 0".to_owned());
+    }
+    let level = text.parse::<u8>().ok().filter(|l| *l < 32);
+    level.map(|l| Criterion::Uniform(Level(l))).ok_or_else(|| "full, a level 0 to 31, or distance[=FACTOR]".to_owned())
+}
+
+/// A clip box in index space.
+pub fn clip(text: &str) -> Result<Aabb, String> {
+    let message = || "a clip box is X0:X1,Y0:Y1,Z0:Z1 in voxels, each lower bound below the upper".to_owned();
+    let spans: Option<Vec<[f64; 2]>> = text.split(',').map(|axis| numbers(axis, ':')).collect();
+    let Some([x, y, z]) = spans.as_deref() else { return Err(message()) };
+    let clip = Aabb { min: DVec3::new(x[0], y[0], z[0]), max: DVec3::new(x[1], y[1], z[1]) };
+    if clip.is_empty() { Err(message()) } else { Ok(clip) }
+}
+
+/// A linear colour.
+pub fn background(text: &str) -> Result<Background, String> {
+    let grey = numbers::<1>(text, ',').map(|[g]| [g; 3]);
+    let rgb = grey.or_else(|| numbers::<3>(text, ',')).filter(|c| c.iter().all(|x| (0.0..=1.0).contains(x)));
+    rgb.map(Background).ok_or_else(|| "R,G,B or one number, each 0 to 1".to_owned())
+}
+
+/// A mode.
+pub fn mode(text: &str) -> Result<Mode, String> {
+    [Mode::Exact, Mode::FAST].into_iter().find(|m| m.name() == text).ok_or_else(|| "exact or fast".to_owned())
+}
+
+/// A quadrature rule.
+pub fn rule(text: &str) -> Result<QuadratureRule, String> {
+    let names = || QuadratureRule::ALL.map(|r| r.name()).join(", ");
+    QuadratureRule::from_name(text).ok_or_else(|| format!("one of {}", names()))
+}
+
+/// How raw voxels lie.
+pub fn raw_spec(text: &str) -> Result<RawSpec, String> {
+    let mut fields = text.split(',');
+    let dims = fields.next().and_then(|d| {
+        let n: Option<Vec<u32>> = d.split('x').map(|n| n.parse().ok().filter(|n| *n > 0)).collect();
+        <[u32; 3]>::try_from(n?).ok()
+    });
+    let scalar = fields.next().and_then(|name| ScalarType::ALL.into_iter().find(|t| t.name() == name));
+    let (Some(dims), Some(scalar)) = (dims, scalar) else {
+        return Err(
+            "NXxNYxNZ,TYPE with TYPE one of u8 i8 u16 i16 u32 i32 f32 f64, for example 256x256x128,u8".to_owned()
+        );
+    };
+    let mut raw = RawSpec::new(dims.into(), scalar);
+    for field in fields {
+        raw_field(&mut raw, field)?;
+    }
+    Ok(raw)
+}
+
+fn raw_field(raw: &mut RawSpec, field: &str) -> Result<(), String> {
+    match field.split_once('=') {
+        None if field == "big" => raw.order = ByteOrder::Big,
+        None if field == "little" => raw.order = ByteOrder::Little,
+        Some(("skip", n)) => raw.skip_bytes = n.parse().map_err(|_| format!("skip={n:?} is not a number of bytes"))?,
+        Some(("spacing", s)) => {
+            let spacing = numbers::<3>(s, ':').ok_or_else(|| format!("spacing={s:?} is not SX:SY:SZ"))?;
+            raw.spacing = DVec3::from(spacing);
+        }
+        _ => return Err(format!("{field:?} is not big, little, skip=BYTES or spacing=SX:SY:SZ")),
+    }
+    Ok(())
+}

@@ -1,0 +1,106 @@
+//! The `brickfield` command as scripts see it: what it prints, writes and ends with.
+
+#![cfg(feature = "cli")]
+
+use std::io::Read;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use brickfield::core::glam::{DVec3, UVec3};
+use brickfield::core::{Grid, Volume};
+use brickfield::io::WorldFrame;
+use brickfield::io::nrrd::{self, NrrdEncoding};
+
+/// A folder with a volume of 12 x 10 x 8 voxels, and the command run in it.
+struct Place {
+    folder: tempfile::TempDir,
+}
+
+impl Place {
+    fn new() -> Place {
+        let folder = tempfile::tempdir().unwrap();
+        let grid = Grid::axis_aligned(UVec3::new(12, 10, 8), DVec3::new(1.0, 1.0, 4.22 + 6e-15)).unwrap();
+        let volume = Volume::new(grid, (0..960).map(|i| (i % 251) as u8).collect::<Vec<_>>()).unwrap();
+        nrrd::save(&folder.path().join("a.nrrd"), &volume, WorldFrame::Plain, NrrdEncoding::Raw).unwrap();
+        Place { folder }
+    }
+
+    fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    fn command(&self, words: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_brickfield"));
+        command.args(words.split('|')).current_dir(self.path());
+        command
+    }
+
+    fn run(&self, words: &str) -> Output {
+        self.command(words).output().unwrap()
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+#[test]
+fn info_says_what_the_file_holds() {
+    let out = Place::new().run("info|a.nrrd");
+    let said = text(&out.stdout);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    assert!(said.contains("12 x 10 x 8") && said.contains("1 x 1 x 4.22 units"), "{said}");
+}
+
+#[test]
+fn a_picture_is_written_and_what_the_volume_lacks_is_said() {
+    let place = Place::new();
+    let out = place.run("render|a.nrrd|-o|a.png|--backend|cpu|--size|8x6|--lod|9|--clip|0:6,0:10,0:99|--step|1/4");
+    let said = text(&out.stderr);
+    assert_eq!(out.status.code(), Some(0), "{said}");
+    assert!(said.contains("--lod 9: the volume has levels 0 to 0") && said.contains("--clip"), "{said}");
+    assert_eq!(image::open(place.path().join("a.png")).unwrap().width(), 8);
+}
+
+/// Arguments after `render`, the status, and what the message must hold.
+const REFUSED: [(&str, i32, &str); 17] = [
+    ("b.nrrd|-o|a.png", 1, "b.nrrd"),
+    ("a.nrrd|-o|a.jpg", 2, "a.jpg: pictures are written as .exr or .png"),
+    ("a.nrrd|-o|no/a.png", 2, "no/a.png: there is no folder no"),
+    ("a.nrrd|-o|a.png|--backend|metal", 2, "\"metal\": there are cpu, wgpu and ash"),
+    ("a.nrrd|-o|a.png|--backend|cpu|--adapter|none such", 3, "none such"),
+    ("a.nrrd|-o|a.png|--step|-1", 2, "above 0"),
+    ("a.nrrd|-o|a.png|--step|nan", 2, "above 0"),
+    ("a.nrrd|-o|a.png|--step|1e-9", 2, "segments"),
+    ("a.nrrd|-o|a.png|--size|0x0", 2, "each 1 to 32768"),
+    ("a.nrrd|-o|a.png|--camera|fov=500", 2, "fov=\"500\" is not above 0 and below 180 degrees"),
+    ("a.nrrd|-o|a.png|--camera|zoom=1e300", 2, "zoom"),
+    ("a.nrrd|-o|a.png|--camera|target=NaN,0,0", 2, "target"),
+    ("a.nrrd|-o|a.png|--camera|eye=1,1,1 target=1,1,1", 2, "--camera: the camera's eye and target"),
+    ("a.nrrd|-o|a.png|--clip|20:30,0:1,0:1", 2, "--clip: the box from"),
+    ("a.nrrd|-o|a.png|--transfer|none such", 2, "--transfer: \"none such\""),
+    ("a.nrrd|-o|a.png|--max-mib|0", 2, "--max-mib"),
+    ("a.nrrd|-o|a.png|--raw|99x99x99,u8", 1, "a.nrrd"),
+];
+
+#[test]
+fn what_is_refused_is_named_and_leaves_nothing_behind() {
+    let place = Place::new();
+    for (words, status, part) in REFUSED {
+        let out = place.run(&format!("render|{words}"));
+        let said = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(status), "{words}: {said}");
+        assert!(said.contains(part), "{words}: {said}");
+        assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 1, "{words}");
+    }
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_failure() {
+    let place = Place::new();
+    let mut child = place.command("info|a.nrrd").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let mut said = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert!(child.wait().unwrap().success() && said.is_empty(), "{said}");
+}
