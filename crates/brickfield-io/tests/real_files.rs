@@ -1,23 +1,29 @@
-//! Real files, held against their manifest. They lie in the folder that BRICKFIELD_DATA names; without it these tests
-//! check nothing, and say so.
+//! Real files, held against their manifest. They lie in the folder that BRICKFIELD_DATA names; without it these tests are
+//! ignored, and say why.
 
 use std::path::{Path, PathBuf};
 
 use brickfield_io::{Limits, Opened, open};
+use libtest_mimic::{Arguments, Failed, Trial};
 use serde_json::Value;
 
-/// The data folder, or nothing with a message. The message goes past the capture of test output.
-fn data_folder() -> Option<PathBuf> {
-    let folder = std::env::var_os("BRICKFIELD_DATA").map(PathBuf::from);
-    if folder.is_none() {
-        eprintln!("no data: set BRICKFIELD_DATA; nothing was checked");
-    }
-    folder
+fn main() {
+    let folder = std::env::var_os("BRICKFIELD_DATA").filter(|f| !f.is_empty()).map(PathBuf::from);
+    let trial = |name: &str, test: fn(&Path, &str) -> Result<(), Failed>| {
+        let (folder, file) = (folder.clone(), name.to_owned());
+        let kind = if folder.is_some() { "" } else { "no data" };
+        let trial = Trial::test(name, move || test(&folder.unwrap_or_default(), &file)).with_kind(kind);
+        trial.with_ignored_flag(kind == "no data")
+    };
+    let files = FILES.iter().map(|file| trial(file.0, is_what_the_manifest_says));
+    let foreign = FOREIGN.iter().map(|file| trial(file.0, is_refused_by_name));
+    let trials = files.chain(foreign).collect();
+    libtest_mimic::run(&Arguments::from_args(), trials).exit();
 }
 
-fn manifest(folder: &Path) -> Vec<Value> {
-    let text = std::fs::read_to_string(folder.join("MANIFEST.json")).expect("BRICKFIELD_DATA has a MANIFEST.json");
-    serde_json::from_str(&text).expect("MANIFEST.json is a list")
+fn manifest(folder: &Path) -> Result<Vec<Value>, Failed> {
+    let text = std::fs::read_to_string(folder.join("MANIFEST.json"))?;
+    Ok(serde_json::from_str(&text)?)
 }
 
 /// Where the manifest's entries lie in the folder, the type they are read as, and the slope by which the manifest's
@@ -38,41 +44,40 @@ const FILES: &[(&str, &str, &str, f64)] = &[
     ("mri-stack.tif", "formats/mri-stack.tif", "u8", 1.0),
 ];
 
-#[test]
-fn files_are_what_the_manifest_says() {
-    let Some(folder) = data_folder() else { return };
-    let manifest = manifest(&folder);
-    let faults: Vec<String> = FILES.iter().filter_map(|file| check(&folder, &manifest, file).err()).collect();
-    assert!(faults.is_empty(), "{}", faults.join("\n"));
-}
-
-fn check(
-    folder: &Path,
-    manifest: &[Value],
-    (name, path, scalar, slope): &(&str, &str, &str, f64),
-) -> Result<(), String> {
-    let entry = manifest.iter().find(|e| e["name"] == *name).ok_or(format!("{name}: not in the manifest"))?;
-    let opened = open(&folder.join(path), &Limits::default()).map_err(|e| e.to_string())?;
-    println!("{name}: {}", summary(&opened));
-    for note in &opened.notes {
-        println!("    note: {note}");
-    }
+fn is_what_the_manifest_says(folder: &Path, name: &str) -> Result<(), Failed> {
+    let manifest = manifest(folder)?;
+    let (_, path, scalar, slope) = FILES.iter().find(|file| file.0 == name).ok_or("not in the table")?;
+    let entry = manifest.iter().find(|e| e["name"] == name).ok_or("not in the manifest")?;
+    let opened = open(&folder.join(path), &Limits::default())?;
     let numbers = |key: &str| -> Vec<f64> { entry[key].as_array().unwrap().iter().filter_map(Value::as_f64).collect() };
     let (grid, range) = (opened.volume.grid(), opened.volume.range());
     let dims = grid.dims().to_array().map(f64::from);
-    expect(name, "dims", &dims, &numbers("dims"), 0.0)?;
-    expect(name, "spacing", &grid.spacing().to_array(), &numbers("spacing"), 5e-5)?;
+    expect("dims", &dims, &numbers("dims"), 0.0)?;
+    expect("spacing", &grid.spacing().to_array(), &numbers("spacing"), 5e-5)?;
     let stated = ["min", "max"].map(|key| entry[key].as_f64().unwrap() * slope);
-    expect(name, "range", &[range.min, range.max], &stated, 1e-9)?;
+    expect("range", &[range.min, range.max], &stated, 1e-9)?;
     match opened.volume.scalar_type().name() == *scalar {
         true => Ok(()),
-        false => Err(format!("{name}: type {}, expected {scalar}", opened.volume.scalar_type())),
+        false => Err(format!("expected {scalar}: {}", summary(&opened)).into()),
     }
 }
 
-fn expect(name: &str, what: &str, found: &[f64], expected: &[f64], tolerance: f64) -> Result<(), String> {
+/// Files of colours and of foreign formats, and what the refusal must name.
+const FOREIGN: &[(&str, &str)] =
+    &[("formats/ct_perfusion_rgb.nii.gz", "RGB24"), ("formats/vdb/sphere_points.vdb", "OpenVDB")];
+
+fn is_refused_by_name(folder: &Path, path: &str) -> Result<(), Failed> {
+    let (_, name) = FOREIGN.iter().find(|file| file.0 == path).ok_or("not in the table")?;
+    match open(&folder.join(path), &Limits::default()) {
+        Ok(opened) => Err(format!("read as {}", summary(&opened)).into()),
+        Err(e) if e.to_string().contains(name) => Ok(()),
+        Err(e) => Err(format!("{e}: {name} is not named").into()),
+    }
+}
+
+fn expect(what: &str, found: &[f64], expected: &[f64], tolerance: f64) -> Result<(), Failed> {
     let agree = found.len() == expected.len() && found.iter().zip(expected).all(|(f, e)| (f - e).abs() <= tolerance);
-    if agree { Ok(()) } else { Err(format!("{name}: {what} {found:?}, the manifest has {expected:?}")) }
+    if agree { Ok(()) } else { Err(format!("{what} {found:?}, the manifest has {expected:?}").into()) }
 }
 
 fn summary(opened: &Opened) -> String {
@@ -92,12 +97,4 @@ fn summary(opened: &Opened) -> String {
         opened.frame,
         opened.unit,
     )
-}
-
-#[test]
-fn colours_and_foreign_formats_are_refused_by_name() {
-    let Some(folder) = data_folder() else { return };
-    let refusal = |path| open(&folder.join(path), &Limits::default()).unwrap_err().to_string();
-    assert!(refusal("formats/ct_perfusion_rgb.nii.gz").contains("RGB24"));
-    assert!(refusal("formats/vdb/sphere_points.vdb").contains("OpenVDB"));
 }
