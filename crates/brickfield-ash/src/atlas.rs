@@ -1,27 +1,24 @@
 //! The bricks of a plan in one 3-D texture.
 
-use std::sync::{Arc, Weak};
+use std::sync::Arc;
 
 use ash::vk;
 use brickfield_core::glam::UVec3;
-use brickfield_frame::{AtlasShape, BrickSet, RenderError, SampleFormat};
+use brickfield_frame::{AtlasShape, BrickSet, Held, RenderError, SampleFormat};
 
 use crate::staging::{CHUNK_BYTES, Staging};
 use crate::vulkan::{Device, Image, ImageBox, Queue, Use, vulkan_format};
 
 /// A set of bricks on the device.
-///
-/// The set is remembered without being kept: an address in a [`Weak`] is not used again while the `Weak` lives, so the
-/// host's copy of the bricks may go while the device's stays.
 pub(crate) struct Atlas {
     image: Image,
-    set: Weak<BrickSet>,
+    set: Held<BrickSet>,
 }
 
 impl Atlas {
     /// Whether this is the atlas of that set.
     pub(crate) fn holds(&self, set: &Arc<BrickSet>) -> bool {
-        std::ptr::eq(self.set.as_ptr(), Arc::as_ptr(set))
+        self.set.is(set)
     }
 
     /// The texture.
@@ -55,7 +52,7 @@ impl Atlas {
         queue.run("finishing the brick atlas", |recorder| {
             recorder.image_barrier(&image, Use::CopyTarget, Use::ShaderRead);
         })?;
-        Ok(Atlas { image, set: Arc::downgrade(set) })
+        Ok(Atlas { image, set: Held::of(set) })
     }
 }
 

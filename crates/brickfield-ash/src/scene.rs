@@ -1,10 +1,10 @@
 //! What a plan brings to the device: bricks, index, transfer function, uniforms.
 
-use std::sync::{Arc, Weak};
+use std::sync::Arc;
 
 use ash::vk;
 use brickfield_core::glam::UVec3;
-use brickfield_frame::{AtlasShape, FramePlan, FrameUniforms, KnotUniform, Occupancy, RenderError};
+use brickfield_frame::{AtlasShape, FramePlan, FrameUniforms, Held, KnotUniform, Occupancy, RenderError};
 use brickfield_shaders::BindingKind;
 
 use crate::atlas::{Atlas, atlas_shape, check_format};
@@ -23,7 +23,7 @@ pub(crate) struct Scene {
     knots: Slot,
     seen_before: Slot,
     /// And the map that is in it.
-    occupancy: (Slot, Weak<Occupancy>),
+    occupancy: (Slot, Held<Occupancy>),
     beams: Slot,
 }
 
@@ -46,7 +46,7 @@ impl Scene {
             index: Slot::new("the brick index", vk::BufferUsageFlags::STORAGE_BUFFER),
             knots: Slot::new("the transfer function", vk::BufferUsageFlags::STORAGE_BUFFER),
             seen_before: Slot::new("rays between passes", vk::BufferUsageFlags::STORAGE_BUFFER),
-            occupancy: (Slot::new("the occupancy of bricks", vk::BufferUsageFlags::STORAGE_BUFFER), Weak::new()),
+            occupancy: (Slot::new("the occupancy of bricks", vk::BufferUsageFlags::STORAGE_BUFFER), Held::nothing()),
             beams: Slot::new("the beams", vk::BufferUsageFlags::STORAGE_BUFFER),
         })
     }
@@ -93,12 +93,11 @@ impl Scene {
         occupancy: &Arc<Occupancy>,
     ) -> Result<(), RenderError> {
         let (slot, held) = &mut self.occupancy;
-        // An address in a `Weak` is not used again while the `Weak` lives.
-        if !std::ptr::eq(held.as_ptr(), Arc::as_ptr(occupancy)) {
-            *held = Weak::new();
+        if !held.is(occupancy) {
+            *held = Held::nothing();
             let bytes = bytemuck::cast_slice(occupancy.distances());
             staging.fill(queue, &[(slot.reserve(&self.device, bytes.len())?, bytes)])?;
-            *held = Arc::downgrade(occupancy);
+            *held = Held::of(occupancy);
         }
         Ok(())
     }

@@ -60,7 +60,7 @@ impl Decode {
 
 /// The samples of the bricks that a frame needs, in slots: brick after brick, n^3 samples each, x fastest, little endian.
 ///
-/// Sets are compared by identity ([`std::sync::Arc::ptr_eq`]) to tell whether a backend holds them already.
+/// Sets are compared by identity ([`Held`](crate::Held)) to tell whether a backend holds them already.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BrickSet {
     side: BrickSide,

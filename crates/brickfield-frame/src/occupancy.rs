@@ -17,7 +17,7 @@ pub const MACROCELL_SIDE: u32 = 2;
 /// samples, so that passing over them changes no sample. d < 0: all less than -d away are visible, so that nobody need look
 /// again there. A brick's byte for a macrocell is never 0.
 ///
-/// Maps are compared by identity ([`Arc::ptr_eq`]) to tell whether a backend holds them already.
+/// Maps are compared by identity ([`Held`](crate::Held)) to tell whether a backend holds them already.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Occupancy {
     side: BrickSide,

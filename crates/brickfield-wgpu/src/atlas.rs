@@ -2,22 +2,21 @@
 
 use std::sync::Arc;
 
-use brickfield_frame::{AtlasShape, BrickSet, RenderError, SampleFormat};
+use brickfield_frame::{AtlasShape, BrickSet, Held, RenderError, SampleFormat};
 use wgpu::{Features, TextureFormat};
 
 use crate::device::Device;
 
 /// The texture that holds a brick set.
 pub(crate) struct Atlas {
-    /// Held so that its address stays its own.
-    bricks: Arc<BrickSet>,
+    bricks: Held<BrickSet>,
     pub(crate) view: wgpu::TextureView,
 }
 
 impl Atlas {
     /// Whether the texture holds this very set.
     pub(crate) fn holds(&self, bricks: &Arc<BrickSet>) -> bool {
-        Arc::ptr_eq(&self.bricks, bricks)
+        self.bricks.is(bricks)
     }
 
     /// Uploads a brick set, laid out in `shape`.
@@ -42,7 +41,7 @@ impl Atlas {
                 write_layer(device, &texture, bricks, shape, layer);
             }
             let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-            Atlas { bricks: Arc::clone(bricks), view }
+            Atlas { bricks: Held::of(bricks), view }
         })
     }
 }

@@ -1,13 +1,12 @@
 //! The backend: what stays on the device, and the replay of a plan.
 
-use std::sync::{Arc, Weak};
 use std::time::Instant;
 
 use brickfield_core::Image;
 use brickfield_core::glam::UVec2;
 use brickfield_frame::{
-    AtlasShape, Backend, Description, Feature, Frame, FramePlan, FrameUniforms, KnotUniform, Occupancy, RenderError,
-    ShaderFunction, Timing,
+    AtlasShape, Backend, Description, Feature, Frame, FramePlan, FrameUniforms, Held, KnotUniform, Occupancy,
+    RenderError, ShaderFunction, Timing,
 };
 use brickfield_shaders::{Entry, ShaderLibrary, Variant, passes, pixels_per_pass, shader_inputs, shader_outputs};
 use wgpu::{BufferUsages, Features};
@@ -40,7 +39,7 @@ struct Scene {
     knots: Reused,
     seen_before: Reused,
     /// And the map that is in it.
-    occupancy: (Reused, Weak<Occupancy>),
+    occupancy: (Reused, Held<Occupancy>),
     beams: Reused,
     inputs: Reused,
     results: Reused,
@@ -186,7 +185,7 @@ impl Scene {
             index: Reused::new("the brick index", storage),
             knots: Reused::new("the transfer function", storage),
             seen_before: Reused::new("rays between passes", storage),
-            occupancy: (Reused::new("the occupancy of bricks", storage), Weak::new()),
+            occupancy: (Reused::new("the occupancy of bricks", storage), Held::nothing()),
             beams: Reused::new("the beams", storage),
             inputs: Reused::new("the inputs", storage),
             results: Reused::new("the results", BufferUsages::STORAGE | BufferUsages::COPY_SRC),
@@ -231,11 +230,10 @@ impl Scene {
     fn hold_occupancy(&mut self, device: &Device, plan: &FramePlan) -> Result<(), RenderError> {
         let Some(occupancy) = &plan.occupancy else { return Err(unbound()) };
         let (buffer, held) = &mut self.occupancy;
-        // An address in a `Weak` is not used again while the `Weak` lives.
-        if !std::ptr::eq(held.as_ptr(), Arc::as_ptr(occupancy)) {
-            *held = Weak::new();
+        if !held.is(occupancy) {
+            *held = Held::nothing();
             buffer.write(device, bytemuck::cast_slice(occupancy.distances()))?;
-            *held = Arc::downgrade(occupancy);
+            *held = Held::of(occupancy);
         }
         Ok(())
     }
