@@ -30,6 +30,13 @@ impl Occupancy {
         side.n_samples() / MACROCELL_SIDE
     }
 
+    /// Whether a map of so many bricks fits the storage buffers that every Vulkan device has: 128 MiB.
+    ///
+    /// Of more bricks no map is made: their rays pass over dark bricks only.
+    pub const fn fits(side: BrickSide, n_bricks: u32) -> bool {
+        (Occupancy::n_macrocells(side) as u64).pow(3) * n_bricks as u64 <= 1 << 27
+    }
+
     /// The map of bricks of which it is known what is visible: macrocell after macrocell, x fastest, brick after brick.
     ///
     /// `None` if everything is visible: then there is nothing to leap over.
@@ -97,6 +104,14 @@ mod tests {
                 let nearest = others.map(|(b, _)| far(b)).min().unwrap();
                 assert_eq!(*d, if *is_visible { -nearest } else { nearest });
             }
+        }
+    }
+
+    #[test]
+    fn maps_of_more_than_a_gibivoxel_fit_nowhere() {
+        for side in [BrickSide::S16, BrickSide::S32, BrickSide::S64] {
+            let n_bricks = (1u32 << 30) / side.n_samples().pow(3);
+            assert!(Occupancy::fits(side, n_bricks) && !Occupancy::fits(side, n_bricks + 1));
         }
     }
 

@@ -45,12 +45,13 @@ impl Residency {
         }
     }
 
-    /// What a transfer function shows of the held set; `None` if it shows something of every macrocell.
+    /// What a transfer function shows of the held set; `None` if it shows something of every macrocell, or the set is too
+    /// large for a map.
     pub(crate) fn occupancy(&mut self, transfer: &TransferFunction) -> Option<Arc<Occupancy>> {
         match &self.occupancy {
             Some((of, occupancy)) if of == transfer => occupancy.clone(),
             _ => {
-                let set = self.set.as_deref()?;
+                let set = self.set.as_deref().filter(|set| Occupancy::fits(set.side(), set.n_bricks()))?;
                 let occupancy = self.ranges.get_or_insert_with(|| MacrocellRanges::of(set)).occupancy(transfer);
                 self.occupancy = Some((transfer.clone(), occupancy.clone()));
                 occupancy
