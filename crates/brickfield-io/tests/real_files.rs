@@ -101,3 +101,34 @@ fn colours_and_foreign_formats_are_refused_by_name() {
     assert!(refusal("formats/ct_perfusion_rgb.nii.gz").contains("RGB24"));
     assert!(refusal("formats/vdb/sphere_points.vdb").contains("OpenVDB"));
 }
+
+/// Cut in half: the path, and what is said before and after the bytes that came of the promised ones.
+const HALVES: &[(&str, &str, &str)] = &[
+    (
+        "ct/engine.vti",
+        "DataArray \"ImageFile\" holds ",
+        " bytes, then its compressed data are cut off; 8388608 are promised",
+    ),
+    ("mri/spm152.nii.gz", "the image holds ", " bytes, then its compressed data are cut off; 11393280 are promised"),
+    (
+        "ct/LIDC2.mha",
+        "the data after the header holds ",
+        " bytes, then its compressed data are cut off; 8716288 are promised",
+    ),
+    ("formats/mri-stack.tif", "the file ends at byte ", ", before the tags of page 2 of 27 at byte 1135163"),
+];
+
+#[test]
+fn half_a_file_says_how_much_of_it_came() {
+    let Some(folder) = data_folder() else { return };
+    let cut = tempfile::tempdir().unwrap();
+    for (path, before, after) in HALVES {
+        let bytes = std::fs::read(folder.join(path)).unwrap();
+        let half = cut.path().join(Path::new(path).file_name().unwrap());
+        std::fs::write(&half, &bytes[..bytes.len() / 2]).unwrap();
+        let said = open(&half, &Limits::default()).unwrap_err().fault.to_string();
+        let n_bytes = said.strip_prefix(before).and_then(|s| s.strip_suffix(after));
+        let n_bytes: u64 = n_bytes.and_then(|n| n.parse().ok()).unwrap_or_else(|| panic!("{path}: {said}"));
+        assert!(n_bytes > 500_000, "{path}: {said}");
+    }
+}
