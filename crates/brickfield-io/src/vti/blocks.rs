@@ -106,6 +106,8 @@ impl Blocks<'_> {
         if n_bytes != expected_bytes {
             return Err(Damage::ShortBlock { n_bytes, expected_bytes }.into());
         }
+        // At the end is the checksum: a block that disagrees with it is not given.
+        unpacked.read(&mut [0]).inspect_err(|_| self.block.clear())?;
         io::copy(&mut compressed, &mut io::sink()).map(|_| ())
     }
 }

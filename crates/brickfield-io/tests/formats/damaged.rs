@@ -189,6 +189,7 @@ mod packed {
             blocks[i] = block;
             vti(&blocks)
         };
+        let flipped = |i: usize| with_last_flipped(blocks[i].clone(), 6);
         check(&[
             (
                 "v.vti",
@@ -199,6 +200,16 @@ mod packed {
                 "v.vti",
                 file[..start - 2].to_vec(),
                 "a word of the header of DataArray \"a\" holds 2 bytes; 4 are promised",
+            ),
+            (
+                "v.vti",
+                broken(1, flipped(1)),
+                "DataArray \"a\" holds 10 bytes, then its compressed data are corrupt; 24 are promised",
+            ),
+            (
+                "v.vti",
+                broken(2, flipped(2)),
+                "DataArray \"a\" holds 20 bytes, then its compressed data are corrupt; 24 are promised",
             ),
             (
                 "v.vti",
