@@ -1,9 +1,10 @@
 //! zlib and gzip streams, bounded by what deflate can expand.
 
-use std::io::{self, BufRead, Read};
+use std::io::{self, BufRead, ErrorKind, Read};
 
 use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
 
+use crate::error::Damage;
 use crate::stored::note_surplus;
 use crate::{Note, ReadError};
 
@@ -23,19 +24,50 @@ pub(crate) fn check_ratio(what: &str, n_compressed_bytes: u64, expected_bytes: u
 pub(crate) fn inflate<'a, R: BufRead + ?Sized>(source: &'a mut R) -> io::Result<Box<dyn Read + 'a>> {
     let is_gzip = source.fill_buf()?.first() == Some(&0x1f);
     Ok(match is_gzip {
-        true => Box::new(MultiGzDecoder::new(source)),
-        false => Box::new(ZlibDecoder::new(source)),
+        true => Box::new(Unpacked(MultiGzDecoder::new(source))),
+        false => Box::new(Unpacked(ZlibDecoder::new(source))),
     })
 }
 
+/// A decoder whose faults are [`Damage`].
+pub(crate) struct Unpacked<R>(pub(crate) R);
+
+/// A decoder that fails drops what it has unpacked in that call; with shorter calls less is missing from the count.
+const MAX_READ_BYTES: usize = 1 << 15;
+
+impl<R: Read> Read for Unpacked<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let n = buffer.len().min(MAX_READ_BYTES);
+        self.0.read(&mut buffer[..n]).map_err(damage)
+    }
+}
+
+/// What `flate2` means: it reports corrupt data as invalid input.
+fn damage(fault: io::Error) -> io::Error {
+    let is_of_source = fault.get_ref().is_some_and(|e| e.is::<Damage>());
+    match fault.kind() {
+        _ if is_of_source => fault,
+        ErrorKind::UnexpectedEof => Damage::CutOff.into(),
+        ErrorKind::InvalidInput | ErrorKind::InvalidData => Damage::Corrupt.into(),
+        _ => fault,
+    }
+}
+
 /// Reads on to the end of the stream, where its checksum is: at most one byte, so that a bomb stays shut.
-pub(crate) fn check_end(inflated: &mut dyn Read, what: &str, notes: &mut Vec<Note>) -> Result<(), ReadError> {
+///
+/// `n_bytes` have been read, which are all that were promised.
+pub(crate) fn check_end(
+    inflated: &mut dyn Read,
+    what: &str,
+    n_bytes: u64,
+    notes: &mut Vec<Note>,
+) -> Result<(), ReadError> {
     match inflated.read(&mut [0]) {
         Ok(0) => Ok(()),
         Ok(_) => {
             note_surplus(notes);
             Ok(())
         }
-        Err(e) => Err(ReadError::io(what, e)),
+        Err(e) => Err(ReadError::reading(what, n_bytes, u128::from(n_bytes), e)),
     }
 }

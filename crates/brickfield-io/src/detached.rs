@@ -2,6 +2,7 @@
 
 use brickfield_core::Voxels;
 
+use crate::error::counted;
 use crate::file_list::FileNames;
 use crate::files::{DataFiles, open_named};
 use crate::limits::Shape;
@@ -46,7 +47,7 @@ pub(crate) fn read_detached(
 fn samples_per_file(names: &FileNames, n_promised: u128) -> Result<u128, ReadError> {
     let n_files = names.n_files();
     if n_files == 0 || !n_promised.is_multiple_of(n_files) {
-        let expected = format!("a divisor of the {n_promised} samples, above 0");
+        let expected = format!("a divisor of the {}, above 0", counted(n_promised, "sample", "samples"));
         return Err(ReadError::field("number of data files", n_files, expected));
     }
     Ok(n_promised / n_files)

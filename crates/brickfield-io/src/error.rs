@@ -35,7 +35,7 @@ pub enum ReadError {
     Empty,
     #[error("no known volume format; it starts with {found}")]
     UnknownFormat { found: Shown },
-    #[error("no DICOM slices and no OME-Zarr metadata among the {n_entries} entries of this folder")]
+    #[error("no DICOM slices and no OME-Zarr metadata among the {} of this folder", counted(*n_entries, "entry", "entries"))]
     UnknownFolder { n_entries: usize },
     #[error("not {format}: {what} is {found}, expected {expected}")]
     WrongMagic { format: Format, what: &'static str, found: Shown, expected: &'static str },
@@ -43,23 +43,31 @@ pub enum ReadError {
     FeatureOff { format: Format, feature: &'static str },
     #[error("{field} is missing")]
     Missing { field: &'static str },
-    #[error("{field} is {value}; expected {expected}")]
+    #[error("{} is {value}; expected {}", one_line(field), one_line(expected))]
     Field { field: String, value: Shown, expected: String },
     #[error("{what} {value} is not supported; {supported}")]
     Unsupported { what: &'static str, value: Shown, supported: &'static str },
-    #[error("{what} would take {n_bytes} bytes; the limit is {max_bytes} bytes")]
+    #[error("{what} would take {}; the limit is {}", bytes(*n_bytes), bytes(*max_bytes))]
     TooLarge { what: String, n_bytes: u128, max_bytes: u64 },
-    #[error("{what} holds {n_bytes} bytes; {expected_bytes} are promised")]
+    #[error("{} holds {}; {} promised", one_line(what), bytes(*n_bytes), are(*expected_bytes))]
     Truncated { what: String, n_bytes: u64, expected_bytes: u128 },
-    #[error("{what} has {n_compressed_bytes} compressed bytes, too few for the {expected_bytes} promised")]
+    /// Packed data that could be unpacked up to some point: past the last byte promised there is still a checksum.
+    #[error("{what} holds {}", damaged(*n_bytes, *expected_bytes, damage))]
+    Damaged { what: String, n_bytes: u64, expected_bytes: u128, damage: Damage },
+    /// `end` is where the part would end, as far as the file says.
+    #[error("{}", ends_within(*n_file_bytes, part, *end))]
+    EndsWithin { part: String, n_file_bytes: u64, end: Option<u64> },
+    #[error("the file ends at byte {n_file_bytes}, before {part} at byte {start}")]
+    EndsBefore { part: String, n_file_bytes: u64, start: u64 },
+    #[error("{} has {}, too few for the {expected_bytes} promised", one_line(what), counted(*n_compressed_bytes, "compressed byte", "compressed bytes"))]
     TooFewCompressed { what: String, n_compressed_bytes: u64, expected_bytes: u128 },
-    #[error("{what} holds {found} samples; {expected} are promised")]
+    #[error("{} holds {}; {} promised", one_line(what), counted(*found, "sample", "samples"), are(*expected as u128))]
     TooFewSamples { what: String, found: usize, expected: usize },
     #[error("cannot read {what}: {source}")]
     Io { what: String, source: io::Error },
-    #[error("no memory for {n_bytes} bytes of voxels")]
+    #[error("no memory for {} of voxels", bytes(*n_bytes))]
     OutOfMemory { n_bytes: u128 },
-    #[error("{what}: {}", one_line(&source.to_string()))]
+    #[error("{what}: {}", one_line(&chain(&**source)))]
     Decoder { what: String, source: Box<dyn Error + Send + Sync> },
     #[error("the {what} decoder gave up on this file (it panicked)")]
     DecoderPanicked { what: &'static str },
@@ -67,6 +75,44 @@ pub enum ReadError {
     Grid(Box<GridError>),
     #[error("{0}")]
     Volume(#[from] VolumeError),
+}
+
+/// What is wrong with packed data after the bytes that could be unpacked.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum Damage {
+    #[error("its compressed data are cut off")]
+    CutOff,
+    #[error("its compressed data are corrupt")]
+    Corrupt,
+    #[error("a block ends after {n_bytes} of its {}", bytes(*expected_bytes))]
+    ShortBlock { n_bytes: u64, expected_bytes: u64 },
+    #[error("its base64 text has the symbol {found}")]
+    NotBase64 { found: Shown },
+    #[error("its base64 text is cut off")]
+    Base64CutOff,
+}
+
+/// Carries the damage through [`Read`](io::Read).
+impl From<Damage> for io::Error {
+    fn from(damage: Damage) -> io::Error {
+        io::Error::new(io::ErrorKind::InvalidData, damage)
+    }
+}
+
+fn damaged(n_bytes: u64, expected_bytes: u128, damage: &Damage) -> String {
+    match u128::from(n_bytes) < expected_bytes {
+        true => format!("{}, then {damage}; {} promised", bytes(n_bytes), are(expected_bytes)),
+        false => format!("the {} promised, but {damage} at the end, where the checksum is", bytes(n_bytes)),
+    }
+}
+
+fn ends_within(n_file_bytes: u64, part: &str, end: Option<u64>) -> String {
+    match end {
+        Some(end) => format!("the file ends at byte {n_file_bytes}, within {part}, which goes on to byte {end}"),
+        None => format!("the file of {} ends within {part}", bytes(n_file_bytes)),
+    }
 }
 
 impl From<GridError> for ReadError {
@@ -86,6 +132,21 @@ impl ReadError {
 
     pub(crate) fn io(what: impl fmt::Display, source: io::Error) -> ReadError {
         ReadError::Io { what: one_line(&what.to_string()), source }
+    }
+
+    /// A reader failed after `n_bytes` of the `expected_bytes` of `what`.
+    pub(crate) fn reading(what: &str, n_bytes: u64, expected_bytes: u128, source: io::Error) -> ReadError {
+        match source.downcast::<Damage>() {
+            Ok(damage) => ReadError::Damaged { what: one_line(what), n_bytes, expected_bytes, damage },
+            Err(source) => ReadError::io(what, source),
+        }
+    }
+
+    /// The file does not begin as the format does.
+    #[cfg(any(feature = "vti", feature = "nifti", feature = "dicom", feature = "tiff"))]
+    pub(crate) fn wrong_start(format: Format, head: &[u8], expected: &'static str) -> ReadError {
+        let what = "the start of the file";
+        ReadError::WrongMagic { format, what, found: Shown::of_bytes(head), expected }
     }
 
     #[cfg(any(feature = "vti", feature = "nifti", feature = "dicom", feature = "ome-zarr", feature = "tiff"))]
@@ -128,6 +189,35 @@ fn shortened(text: &str) -> String {
         Some((end, _)) => format!("{}...", &text[..end]),
         None => text.to_owned(),
     }
+}
+
+/// The text of an error and of its sources, as far as they say more.
+fn chain(fault: &(dyn Error + 'static)) -> String {
+    let mut text = fault.to_string();
+    let mut source = fault.source();
+    while let Some(fault) = source {
+        let more = fault.to_string();
+        if !text.contains(&more) {
+            text = format!("{text}: {more}");
+        }
+        source = fault.source();
+    }
+    text
+}
+
+/// A number and what it counts: "1 byte", "2 bytes".
+pub(crate) fn counted(n: impl fmt::Display, one: &str, many: &str) -> String {
+    let n = n.to_string();
+    let noun = if n == "1" { one } else { many };
+    format!("{n} {noun}")
+}
+
+pub(crate) fn bytes(n: impl fmt::Display) -> String {
+    counted(n, "byte", "bytes")
+}
+
+fn are(n: u128) -> String {
+    counted(n, "is", "are")
 }
 
 /// The text with line breaks and other control characters replaced by spaces, at most 300 characters.

@@ -116,7 +116,7 @@ fn is_nifti(head: &[u8]) -> bool {
     matches!(magic, Some(b"n+1\0" | b"ni1\0")) || matches!(size, Some((348 | 540, _) | (_, 348 | 540)))
 }
 
-fn is_tiff(head: &[u8]) -> bool {
+pub(crate) fn is_tiff(head: &[u8]) -> bool {
     let classic_or_big = |a, b| matches!((a, b), (42 | 43, 0));
     match head {
         [b'I', b'I', a, b, ..] => classic_or_big(*a, *b),

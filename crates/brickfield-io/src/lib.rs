@@ -35,7 +35,7 @@ pub mod tiff;
 #[cfg(feature = "vti")]
 pub mod vti;
 
-pub use error::{OpenError, ReadError, Shown};
+pub use error::{Damage, OpenError, ReadError, Shown};
 pub use files::{ByteSource, DataFiles, Folder, NoFiles};
 pub use format::Format;
 pub use limits::Limits;

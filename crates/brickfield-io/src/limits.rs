@@ -52,7 +52,7 @@ impl Shape {
         self.n_voxels_claimed() as usize
     }
 
-    #[cfg(feature = "vti")]
+    #[cfg(any(feature = "vti", feature = "nifti"))]
     pub(crate) fn n_bytes(&self) -> u64 {
         self.n_voxels_claimed() as u64 * self.scalar.n_bytes() as u64
     }

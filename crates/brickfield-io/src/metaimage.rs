@@ -10,7 +10,7 @@ use brickfield_core::glam::DVec3;
 use brickfield_core::{ScalarType, Voxels};
 
 use crate::detached::read_detached;
-use crate::error::Shown;
+use crate::error::{Shown, counted};
 use crate::file_list::FileNames;
 use crate::files::ByteSource;
 use crate::limits::Shape;
@@ -191,7 +191,7 @@ impl Header {
         let values = numbers::<f64>(field, text)?;
         match values.len() == n {
             true => Ok(Some(values)),
-            false => Err(ReadError::field(field, text, format!("{n} numbers"))),
+            false => Err(ReadError::field(field, text, counted(n, "number", "numbers"))),
         }
     }
 
@@ -228,7 +228,7 @@ fn read_sizes(fields: &BTreeMap<String, String>) -> Result<Vec<u64>, ReadError> 
     let text = fields.get("dimsize").ok_or(ReadError::Missing { field: "DimSize" })?;
     let sizes = numbers::<u64>("DimSize", text)?;
     if sizes.len() != n || sizes.contains(&0) {
-        return Err(ReadError::field("DimSize", text, format!("{n} numbers of at least 1")));
+        return Err(ReadError::field("DimSize", text, format!("{} of at least 1", counted(n, "number", "numbers"))));
     }
     Ok(sizes)
 }

@@ -3,7 +3,7 @@
 //! Orientation: sform if its code is above 0, else qform, else pixdim alone. Not: NIfTI-2, ANALYZE, colours, complex
 //! and 64-bit integers. Of a time series the first volume is read.
 
-use std::io::{self, BufRead, Cursor, Read, Seek};
+use std::io::{BufRead, Cursor, Read, Seek};
 
 use brickfield_core::ScalarType;
 use brickfield_core::glam::{DMat3, DQuat, DVec3};
@@ -16,7 +16,7 @@ use crate::limits::{Shape, check_bytes};
 use crate::opened::Found;
 use crate::placement::{AXES, Placement, usable_spacing};
 use crate::rescale::{Rescale, rescaled, rescaled_type};
-use crate::samples::{allocate, append_binary, fill};
+use crate::samples::{allocate, append_binary, fill_named, skip};
 use crate::stored::check_length;
 use crate::{ByteOrder, DataFiles, Format, Limits, Note, Opened, ReadError, WorldFrame};
 
@@ -87,22 +87,23 @@ fn open_image<'a>(stem: &str, files: &'a dyn DataFiles) -> Result<Box<dyn ByteSo
 
 fn read_header(stream: &mut Stream) -> Result<NiftiHeader, ReadError> {
     let mut bytes = [0; HEADER_BYTES];
-    let n = fill(&mut stream.reader, &mut bytes).map_err(|e| ReadError::io("the header", e))?;
+    let n = fill_named(&mut stream.reader, &mut bytes, "the header")?;
+    let begins_with = |size: u32| {
+        let found = &bytes[..n.min(4)];
+        size.to_le_bytes().starts_with(found) || size.to_be_bytes().starts_with(found)
+    };
+    if !begins_with(348) && !begins_with(540) {
+        return Err(ReadError::wrong_start(Format::Nifti, &bytes[..n], "348, the length of its header"));
+    }
     check_length("the header", n as u64, HEADER_BYTES as u128)?;
-    let size = [bytes[0], bytes[1], bytes[2], bytes[3]];
-    match (u32::from_le_bytes(size), u32::from_be_bytes(size)) {
-        (348, _) | (_, 348) => {}
-        (540, _) | (_, 540) => return Err(ReadError::unsupported("version", "NIfTI-2", "NIfTI-1 is")),
-        (found, _) => return Err(wrong_magic("sizeof_hdr", Shown::new(found), "348")),
+    if begins_with(540) {
+        return Err(ReadError::unsupported("version", "NIfTI-2", "NIfTI-1 is"));
     }
     if !matches!(&bytes[344..], b"n+1\0" | b"ni1\0") {
-        return Err(wrong_magic("magic", Shown::of_bytes(&bytes[344..]), "n+1 or ni1"));
+        let found = Shown::of_bytes(&bytes[344..]);
+        return Err(ReadError::WrongMagic { format: Format::Nifti, what: "magic", found, expected: "n+1 or ni1" });
     }
     NiftiHeader::from_reader(Cursor::new(&bytes[..])).map_err(|e| ReadError::decoder("NIfTI header", e))
-}
-
-fn wrong_magic(what: &'static str, found: Shown, expected: &'static str) -> ReadError {
-    ReadError::WrongMagic { format: Format::Nifti, what, found, expected }
 }
 
 /// Where the samples begin in a file of their own.
@@ -142,12 +143,11 @@ fn read_image(header: &NiftiHeader, mut stream: Stream, at: Position, limits: &L
     let grid = placement.grid(shape.dims)?;
     stream.check_can_hold(u128::from(at.offset) + n_all.saturating_mul(stored.n_bytes() as u128))?;
     check_bytes(u128::from(at.offset), limits, || "the space before vox_offset".to_owned())?;
-    io::copy(&mut (&mut stream.reader).take(at.offset - at.n_read), &mut io::sink())
-        .map_err(|e| ReadError::io("the file", e))?;
+    skip(&mut stream.reader, at.offset - at.n_read, "the space before vox_offset")?;
     let mut voxels = allocate(&shape)?;
     append_binary(&mut voxels, &mut stream.reader, shape.n_voxels(), order(header), "the image")?;
     if stream.is_gzip && n_all == shape.n_voxels() as u128 {
-        crate::deflate::check_end(&mut stream.reader, "the image", &mut found.notes)?;
+        crate::deflate::check_end(&mut stream.reader, "the image", shape.n_bytes(), &mut found.notes)?;
     }
     (found.frame, found.unit) = (frame, unit(header));
     found.finish(grid, rescaled(voxels, rescale, limits)?)

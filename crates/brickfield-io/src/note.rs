@@ -4,6 +4,8 @@ use std::fmt;
 
 use brickfield_core::NonFinite;
 
+use crate::error::counted;
+
 /// Something about a file that the volume alone does not show.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -36,6 +38,8 @@ pub enum Note {
     FilesSkipped { n_files: usize, first: String, reason: String },
     /// Pages of a TIFF that are reduced copies of others.
     PagesSkipped { n_pages: usize },
+    /// The file was read as raw voxels, but begins as files of a known format do.
+    ReadAsRaw { begins_like: &'static str },
     /// The data go on after the last voxel that the header promises.
     SurplusData,
     /// MONOCHROME1: the file wants low values shown bright. Values are as in the file.
@@ -47,11 +51,12 @@ impl fmt::Display for Note {
         match self {
             Note::NonFinite(n) => write!(
                 f,
-                "{} voxels are not finite ({} NaN, {} +infinity, {} -infinity) and were replaced",
-                n.total(),
+                "{} not finite ({} NaN, {} +infinity, {} -infinity) and {} replaced",
+                counted(n.total(), "voxel is", "voxels are"),
                 n.n_nan,
                 n.n_positive_infinity,
-                n.n_negative_infinity
+                n.n_negative_infinity,
+                were(n.total())
             ),
             Note::UnevenSpacing { positions, min_step, median_step, max_step, max_shift } => write!(
                 f,
@@ -73,19 +78,33 @@ impl fmt::Display for Note {
                 write!(f, "rescale by slope {slope} and intercept {intercept} was ignored")
             }
             Note::SeveralSeries { kept, n_series, n_slices_left_out } => {
-                write!(f, "one of {n_series} series was read: {kept}; {n_slices_left_out} slices were left out")
+                let left_out = counted(n_slices_left_out, "slice was", "slices were");
+                write!(f, "one of {n_series} series was read: {kept}; {left_out} left out")
             }
             Note::DuplicateSlices { n_slices } => {
-                write!(f, "{n_slices} slices lie where another does and were left out")
+                let slices = counted(n_slices, "slice lies", "slices lie");
+                write!(f, "{slices} where another does and {} left out", were(*n_slices))
             }
             Note::FilesSkipped { n_files, first, reason } => {
-                write!(f, "{n_files} files are no slices and were skipped, first {first:?}: {reason}")
+                let files = counted(n_files, "file is no slice", "files are no slices");
+                let which = if *n_files == 1 { "" } else { "first " };
+                write!(f, "{files} and {} skipped, {which}{first:?}: {reason}", were(*n_files))
             }
-            Note::PagesSkipped { n_pages } => write!(f, "{n_pages} pages of reduced resolution were skipped"),
+            Note::PagesSkipped { n_pages } => {
+                let pages = counted(n_pages, "page", "pages");
+                write!(f, "{pages} of reduced resolution {} skipped", were(*n_pages))
+            }
+            Note::ReadAsRaw { begins_like } => {
+                write!(f, "the file begins like {begins_like}; it is read as raw voxels, as asked")
+            }
             Note::SurplusData => f.write_str("the data go on after the last voxel that the header promises"),
             Note::LowIsBright => {
                 f.write_str("the file wants low values shown bright (MONOCHROME1); values are as stored")
             }
         }
     }
+}
+
+fn were(n: usize) -> &'static str {
+    if n == 1 { "was" } else { "were" }
 }

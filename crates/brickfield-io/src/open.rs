@@ -1,13 +1,13 @@
 //! Opening a path, whatever format it is in.
 
 use std::fs::File;
-use std::io::{self, BufReader};
+use std::io::{self, BufReader, Seek};
 use std::path::Path;
 
 use crate::error::Shown;
 use crate::files::{open_regular, read_head};
 use crate::format::foreign;
-use crate::{Folder, Format, Limits, OpenError, Opened, RawSpec, ReadError, metaimage, nrrd, raw};
+use crate::{Folder, Format, Limits, Note, OpenError, Opened, RawSpec, ReadError, metaimage, nrrd, raw};
 
 /// Opens a volume: a file, or a folder of DICOM slices or OME-Zarr.
 ///
@@ -24,13 +24,30 @@ pub fn open(path: &Path, limits: &Limits) -> Result<Opened, OpenError> {
     opened.map_err(|fault| OpenError::new(path, fault))
 }
 
-/// Opens raw voxels of a given shape.
+/// Opens raw voxels of a given shape. A file that begins as those of a known format do gets a note.
 ///
 /// # Errors
 /// One line that names the path, what is wrong, the value and the bound.
 pub fn open_raw(path: &Path, spec: &RawSpec, limits: &Limits) -> Result<Opened, OpenError> {
-    let read = || raw::read(buffered(path)?, spec, limits);
-    read().map_err(|fault| OpenError::new(path, fault))
+    read_raw(path, spec, limits).map_err(|fault| OpenError::new(path, fault))
+}
+
+fn read_raw(path: &Path, spec: &RawSpec, limits: &Limits) -> Result<Opened, ReadError> {
+    let mut file = buffered(path)?;
+    let head = read_head(&mut file, HEAD_BYTES)?;
+    file.rewind().map_err(|e| ReadError::io("the file", e))?;
+    let mut opened = raw::read(file, spec, limits)?;
+    if let Some(begins_like) = known_start(&head) {
+        opened.notes.push(Note::ReadAsRaw { begins_like });
+    }
+    Ok(opened)
+}
+
+/// The name of the format that begins like this.
+fn known_start(head: &[u8]) -> Option<&'static str> {
+    let inner = ungzipped(head);
+    let format = Format::from_magic(inner.as_deref().unwrap_or(head)).map(Format::name);
+    format.or_else(|| foreign(head))
 }
 
 /// The format of a file or folder: by content where it has a magic, else by extension.

@@ -7,6 +7,8 @@ use brickfield_core::{Scalar, ScalarType, Voxels, with_voxels};
 
 use crate::ReadError;
 use crate::limits::Shape;
+#[cfg(feature = "gzip")]
+use crate::stored::check_length;
 
 /// Which end of a number comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -85,9 +87,11 @@ fn append_binary_as<T: Sample>(
     let mut n_bytes = 0;
     while n_bytes < expected_bytes {
         let piece = &mut chunk[..CHUNK_BYTES.min(expected_bytes - n_bytes)];
-        let n_read = fill(reader, piece).map_err(|e| ReadError::io(what, e))?;
-        T::append(&piece[..n_read], order, out);
+        let mut n_read = 0;
+        let outcome = fill_counted(reader, piece, &mut n_read);
         n_bytes += n_read;
+        outcome.map_err(|e| ReadError::reading(what, n_bytes as u64, expected_bytes as u128, e))?;
+        T::append(&piece[..n_read], order, out);
         if n_read < piece.len() {
             let (n_bytes, expected_bytes) = (n_bytes as u64, expected_bytes as u128);
             return Err(ReadError::Truncated { what: what.to_owned(), n_bytes, expected_bytes });
@@ -97,17 +101,49 @@ fn append_binary_as<T: Sample>(
 }
 
 /// Reads until the buffer is full or the source ends; bytes read.
+#[cfg(feature = "dicom")]
 pub(crate) fn fill(reader: &mut dyn Read, buffer: &mut [u8]) -> std::io::Result<usize> {
     let mut n = 0;
-    while n < buffer.len() {
-        match reader.read(&mut buffer[n..]) {
+    fill_counted(reader, buffer, &mut n)?;
+    Ok(n)
+}
+
+/// Reads until the buffer is full or the source ends; what has been read by the time of a fault is counted as well.
+fn fill_counted(reader: &mut dyn Read, buffer: &mut [u8], n: &mut usize) -> std::io::Result<()> {
+    while *n < buffer.len() {
+        match reader.read(&mut buffer[*n..]) {
             Ok(0) => break,
-            Ok(m) => n += m,
+            Ok(m) => *n += m,
             Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
             Err(e) => return Err(e),
         }
     }
-    Ok(n)
+    Ok(())
+}
+
+/// Reads until the buffer is full or the source ends, and names `what` in errors; bytes read.
+#[cfg(any(feature = "nifti", feature = "vti"))]
+pub(crate) fn fill_named(reader: &mut dyn Read, buffer: &mut [u8], what: &str) -> Result<usize, ReadError> {
+    let (mut n, expected_bytes) = (0, buffer.len() as u128);
+    let outcome = fill_counted(reader, buffer, &mut n);
+    outcome.map(|()| n).map_err(|e| ReadError::reading(what, n as u64, expected_bytes, e))
+}
+
+/// Reads `n_bytes` and drops them; `what` names them in errors.
+#[cfg(feature = "gzip")]
+pub(crate) fn skip(reader: &mut dyn Read, n_bytes: u64, what: &str) -> Result<(), ReadError> {
+    let (mut n_done, mut chunk) = (0, [0; 4096]);
+    while n_done < n_bytes {
+        let piece = &mut chunk[..(n_bytes - n_done).min(4096) as usize];
+        let (mut n_read, n_wanted) = (0, piece.len());
+        let outcome = fill_counted(reader, piece, &mut n_read);
+        n_done += n_read as u64;
+        outcome.map_err(|e| ReadError::reading(what, n_done, u128::from(n_bytes), e))?;
+        if n_read < n_wanted {
+            return check_length(what, n_done, u128::from(n_bytes));
+        }
+    }
+    Ok(())
 }
 
 /// Appends `n` samples written as text between white space or commas; `what` names the source in errors.

@@ -4,7 +4,10 @@ use std::io::{self, BufRead, SeekFrom};
 
 use brickfield_core::Voxels;
 
+use crate::error::bytes;
 use crate::files::{ByteSource, n_bytes_left};
+#[cfg(feature = "gzip")]
+use crate::samples::skip;
 use crate::samples::{append_binary, append_text, least_text_bytes};
 use crate::{ByteOrder, Note, ReadError};
 
@@ -92,7 +95,7 @@ impl Stored {
         };
         let left = n_bytes_left(source)?;
         if skip > left {
-            return Err(ReadError::field("byte skip", skip, format!("at most the {left} bytes of {name}")));
+            return Err(ReadError::field("byte skip", skip, format!("at most the {} of {name}", bytes(left))));
         }
         seek_forward(source, skip, name)
     }
@@ -118,13 +121,13 @@ impl Stored {
             Encoding::Text => append_text(voxels, source, part.n_wanted, part.name)?,
             #[cfg(feature = "gzip")]
             Encoding::Deflate => {
-                use std::io::Read;
                 let mut inflated = crate::deflate::inflate(source).map_err(|e| ReadError::io(part.name, e))?;
-                let skip = self.compressed_skip()?;
-                io::copy(&mut (&mut inflated).take(skip), &mut io::sink()).map_err(|e| ReadError::io(part.name, e))?;
+                skip(&mut inflated, self.compressed_skip()?, &format!("what is to be skipped of {}", part.name))?;
+                let n_before = voxels.len();
                 append_binary(voxels, &mut inflated, part.n_wanted, self.order, part.name)?;
                 if part.n_samples == part.n_wanted as u128 {
-                    crate::deflate::check_end(&mut inflated, part.name, notes)?;
+                    let n_bytes = (voxels.len() - n_before) * voxels.scalar_type().n_bytes();
+                    crate::deflate::check_end(&mut inflated, part.name, n_bytes as u64, notes)?;
                 }
                 return Ok(());
             }

@@ -17,7 +17,8 @@ fn main() {
     };
     let files = FILES.iter().map(|file| trial(file.0, is_what_the_manifest_says));
     let foreign = FOREIGN.iter().map(|file| trial(file.0, is_refused_by_name));
-    let trials = files.chain(foreign).collect();
+    let halves = HALVES.iter().map(|file| trial(&format!("{HALF}{}", file.0), half_of_it_says_how_much_came));
+    let trials = files.chain(foreign).chain(halves).collect();
     libtest_mimic::run(&Arguments::from_args(), trials).exit();
 }
 
@@ -97,4 +98,34 @@ fn summary(opened: &Opened) -> String {
         opened.frame,
         opened.unit,
     )
+}
+
+const HALF: &str = "half of ";
+
+/// Cut in half: the path, and what is said before and after the bytes that came of the promised ones.
+const HALVES: &[(&str, &str, &str)] = &[
+    (
+        "ct/engine.vti",
+        "DataArray \"ImageFile\" holds ",
+        " bytes, then its compressed data are cut off; 8388608 are promised",
+    ),
+    ("mri/spm152.nii.gz", "the image holds ", " bytes, then its compressed data are cut off; 11393280 are promised"),
+    (
+        "ct/LIDC2.mha",
+        "the data after the header holds ",
+        " bytes, then its compressed data are cut off; 8716288 are promised",
+    ),
+    ("formats/mri-stack.tif", "the file ends at byte ", ", before the tags of page 2 of 27 at byte 1135163"),
+];
+
+fn half_of_it_says_how_much_came(folder: &Path, path: &str) -> Result<(), Failed> {
+    let (_, before, after) = HALVES.iter().find(|file| path.ends_with(file.0)).ok_or("not in the table")?;
+    let path = folder.join(path.trim_start_matches(HALF));
+    let bytes = std::fs::read(&path)?;
+    let cut = tempfile::tempdir()?;
+    let half = cut.path().join(path.file_name().ok_or("no file name")?);
+    std::fs::write(&half, &bytes[..bytes.len() / 2])?;
+    let said = open(&half, &Limits::default()).map_or_else(|e| e.fault.to_string(), |o| summary(&o));
+    let n_bytes = said.strip_prefix(before).and_then(|s| s.strip_suffix(after)).and_then(|n| n.parse().ok());
+    if n_bytes.is_some_and(|n: u64| n > 500_000) { Ok(()) } else { Err(said.into()) }
 }

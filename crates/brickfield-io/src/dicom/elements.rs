@@ -7,6 +7,7 @@ use dicom_core::{Tag, VR};
 use dicom_dictionary_std::StandardDataDictionary;
 
 use crate::ReadError;
+use crate::error::bytes;
 use crate::files::{ByteSource, n_bytes_left};
 use crate::samples::fill;
 use crate::stored::check_length;
@@ -48,9 +49,13 @@ fn walk(source: &mut dyn ByteSource, syntax: Syntax) -> Result<u64, ReadError> {
     let mut n_left = n_bytes_left(source)?;
     let mut nest = Nest { ends: Vec::new() };
     let mut in_pixel_items = false;
+    let mut last_tag = None;
     loop {
         nest.leave_ended(n_left);
-        let Some((header, n_header_bytes)) = read_header(source, syntax)? else { return Ok(0) };
+        let Some((header, n_header_bytes)) = read_header(source, syntax)? else {
+            return if n_left == 0 || in_pixel_items { Ok(0) } else { Err(ends_within_header(source, last_tag)?) };
+        };
+        last_tag = Some(header.tag);
         n_left = n_left.saturating_sub(n_header_bytes);
         if header.tag == ITEM_END || header.tag == SEQUENCE_END {
             nest.leave_delimited();
@@ -75,6 +80,16 @@ fn walk(source: &mut dyn ByteSource, syntax: Syntax) -> Result<u64, ReadError> {
             return Ok(n_left);
         }
     }
+}
+
+/// The file ends within the tag or the length of an element.
+fn ends_within_header(source: &mut dyn ByteSource, last_tag: Option<(u16, u16)>) -> Result<ReadError, ReadError> {
+    let n_file_bytes = source.stream_position().map_err(|e| ReadError::io("the data set", e))? + n_bytes_left(source)?;
+    let part = match last_tag {
+        Some((group, element)) => format!("the element after ({group:04x},{element:04x})"),
+        None => "the first element of the data set".to_owned(),
+    };
+    Ok(ReadError::EndsWithin { part, n_file_bytes, end: None })
 }
 
 /// The sequences and items around an element: how many bytes are left at their ends, or nothing if a delimiter ends
@@ -111,7 +126,7 @@ impl Nest {
 fn check_element_length(header: &Header, n_left: u64) -> Result<(), ReadError> {
     let value_bytes = value_bytes(header.vr);
     let expected = if u64::from(header.length) > n_left {
-        format!("at most the {n_left} bytes left")
+        format!("at most the {} left", bytes(n_left))
     } else if !header.length.is_multiple_of(value_bytes) {
         format!("a multiple of {value_bytes}")
     } else {

@@ -53,7 +53,9 @@ fn read_headers(names: &[String], files: &dyn DataFiles, notes: &mut Vec<Note>) 
         match guarded("DICOM", || Slice::read(name, files)) {
             Ok(slice) => slices.push(slice),
             // A slice that is damaged: without it the volume would have another shape.
-            Err(fault @ ReadError::Field { .. }) => return Err(ReadError::decoder(format!("slice {name:?}"), fault)),
+            Err(fault @ (ReadError::Field { .. } | ReadError::EndsWithin { .. })) => {
+                return Err(ReadError::decoder(format!("slice {name:?}"), fault));
+            }
             Err(fault) => skipped.push((name, fault)),
         }
     }

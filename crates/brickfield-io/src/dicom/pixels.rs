@@ -6,6 +6,7 @@ use dicom_object::DefaultDicomObject;
 use dicom_pixeldata::PixelDecoder;
 
 use super::slice::{Bits, Part, Slice, read_object};
+use crate::error::bytes;
 use crate::files::{DataFiles, open_named};
 use crate::guard::guarded;
 use crate::limits::{Limits, Shape, check_bytes};
@@ -28,8 +29,9 @@ pub(super) fn read_stored(slices: &[Slice], shape: &Shape, files: &dyn DataFiles
 fn decode(slice: &Slice, files: &dyn DataFiles) -> Result<Vec<u8>, ReadError> {
     let object = read_object(&mut *open_named(files, &slice.name)?, Part::WithPixels)?;
     check_fragments(&object, slice)?;
-    let decoded = object.decode_pixel_data_frame(0).map_err(|e| ReadError::decoder(&slice.name, e))?;
     let expected_bytes = slice.n_samples() as u128 * u128::from(slice.bits.n_allocated / 8);
+    let what = || format!("the pixels of {:?}, {} promised", slice.name, bytes(expected_bytes));
+    let decoded = object.decode_pixel_data_frame(0).map_err(|e| ReadError::decoder(what(), e))?;
     check_length(&slice.name, decoded.data().len() as u64, expected_bytes)?;
     Ok(decoded.into_data())
 }

@@ -9,7 +9,6 @@ use dicom_object::file::ReadPreamble;
 use dicom_object::{DefaultDicomObject, OpenFileOptions, Tag};
 
 use super::elements::{Syntax, check_lengths, read_transfer_syntax};
-use crate::error::Shown;
 use crate::files::{ByteSource, DataFiles, n_bytes_left, open_named, read_head};
 use crate::rescale::Rescale;
 use crate::{Format, ReadError};
@@ -92,8 +91,7 @@ pub(super) fn read_object(source: &mut dyn ByteSource, part: Part) -> Result<Def
     }
     let head = read_head(source, 132)?;
     if head.get(128..) != Some(b"DICM") {
-        let found = Shown::of_bytes(head.get(128..).unwrap_or_default());
-        return Err(ReadError::WrongMagic { format: Format::Dicom, what: "byte 128", found, expected: "DICM" });
+        return Err(ReadError::wrong_start(Format::Dicom, &head, "128 bytes of any kind, then DICM"));
     }
     let syntax = known_syntax(&read_transfer_syntax(source)?)?;
     let end = check_lengths(source, syntax)?;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use brickfield_core::ScalarType;
 
-use crate::error::Shown;
+use crate::error::{Shown, counted};
 use crate::file_list::FileNames;
 use crate::files::ByteSource;
 use crate::lines::{HeaderLines, numbers};
@@ -70,7 +70,11 @@ impl Header {
         let text = self.required("sizes", "sizes")?;
         let sizes = numbers::<u64>("sizes", text)?;
         if sizes.len() != n_axes {
-            return Err(ReadError::field("sizes", text, format!("{n_axes} numbers, one per axis")));
+            return Err(ReadError::field(
+                "sizes",
+                text,
+                format!("{}, one per axis", counted(n_axes, "number", "numbers")),
+            ));
         }
         if sizes.contains(&0) {
             return Err(ReadError::field("sizes", text, "numbers of at least 1"));
@@ -166,7 +170,7 @@ impl Header {
         }
         let n_expected = self.sizes[subdim..].iter().fold(1u128, |n, s| n.saturating_mul(u128::from(*s)));
         if subdim < self.sizes.len() && names.n_files() != n_expected {
-            let expected = format!("{n_expected} (files of {subdim} axes)");
+            let expected = format!("{n_expected} (files of {})", counted(subdim, "axis", "axes"));
             return Err(ReadError::field("number of data files", names.n_files(), expected));
         }
         Ok(())

@@ -3,6 +3,7 @@
 use brickfield_core::glam::DVec3;
 
 use super::header::Header;
+use crate::error::counted;
 use crate::placement::{AXES, Placement, usable_spacing};
 use crate::{Note, ReadError, WorldFrame};
 
@@ -38,7 +39,7 @@ fn directions(header: &Header) -> Result<Option<Directions>, ReadError> {
     let Some(text) = header.text("spacedirections") else { return Ok(None) };
     let vectors = vectors("space directions", text)?;
     if vectors.len() != header.sizes.len() {
-        let expected = format!("{} vectors or none, one per axis", header.sizes.len());
+        let expected = format!("{} or none, one per axis", counted(header.sizes.len(), "vector", "vectors"));
         return Err(ReadError::field("space directions", text, expected));
     }
     Ok(Some(vectors))
@@ -161,7 +162,11 @@ fn per_axis(header: &Header, name: &str, field: &'static str) -> Result<Option<V
     let Some(text) = header.text(name) else { return Ok(None) };
     let values = crate::lines::numbers::<f64>(field, text)?;
     if values.len() != header.sizes.len() {
-        return Err(ReadError::field(field, text, format!("{} numbers, one per axis", header.sizes.len())));
+        return Err(ReadError::field(
+            field,
+            text,
+            format!("{}, one per axis", counted(header.sizes.len(), "number", "numbers")),
+        ));
     }
     Ok(Some(values))
 }

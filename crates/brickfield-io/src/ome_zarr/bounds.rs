@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::metadata::numbers;
 use crate::ReadError;
+use crate::error::{Damage, bytes};
 
 /// What compresses the bytes of a chunk, or of the parts of a shard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,8 +82,10 @@ impl Packing {
         match self {
             Packing::Plain(compressor) => check_stream(*compressor, stored, n_bytes(chunk_shape), what),
             Packing::Shard(shard) => {
-                for part in shard.parts(stored, chunk_shape, what)? {
-                    check_stream(shard.compressor, part, n_bytes(&shard.part_shape), what)?;
+                let parts = shard.parts(stored, chunk_shape, what)?;
+                for (i, part) in parts.iter().enumerate() {
+                    let what = format!("part {} of {} of {what}", i + 1, parts.len());
+                    check_stream(shard.compressor, part, n_bytes(&shard.part_shape), &what)?;
                 }
                 Ok(())
             }
@@ -125,7 +128,7 @@ impl Shard {
             return Err(bad(
                 "index length",
                 index_bytes.to_string(),
-                format!("at most the {} bytes stored", stored.len()),
+                format!("at most the {} stored", bytes(stored.len())),
             ));
         }
         let start = if self.is_index_first { 0 } else { stored.len() - index_bytes as usize };
@@ -139,7 +142,7 @@ impl Shard {
             }
             let end = offset.checked_add(n_bytes).filter(|end| *end <= stored.len() as u64);
             let end = end.ok_or_else(|| {
-                bad("index entry", format!("{offset} + {n_bytes}"), format!("within {} bytes", stored.len()))
+                bad("index entry", format!("{offset} + {n_bytes}"), format!("within {}", bytes(stored.len())))
             })?;
             parts.push(&stored[offset as usize..end as usize]);
         }
@@ -152,10 +155,16 @@ fn check_stream(compressor: Compressor, stored: &[u8], max_bytes: u64, what: &st
         Compressor::None => return Ok(()),
         Compressor::Gzip => n_unpacked(flate2::read::GzDecoder::new(stored), max_bytes),
         Compressor::Zlib => n_unpacked(flate2::read::ZlibDecoder::new(stored), max_bytes),
-        Compressor::Zstd => zstd::Decoder::with_buffer(stored).and_then(|d| n_unpacked(d, max_bytes)),
+        Compressor::Zstd => {
+            let decoder = zstd::Decoder::with_buffer(stored).map_err(|e| ReadError::io(what, e))?;
+            n_unpacked(decoder, max_bytes)
+        }
         Compressor::Blosc => Ok(blosc_bytes(stored)),
     };
-    let n_bytes = unpacked.map_err(|e| ReadError::io(what, e))?;
+    let n_bytes = unpacked.map_err(|(n_bytes, damage)| {
+        let (what, expected_bytes) = (what.to_owned(), u128::from(max_bytes));
+        ReadError::Damaged { what, n_bytes, expected_bytes, damage }
+    })?;
     if n_bytes > max_bytes {
         return Err(ReadError::TooLarge {
             what: format!("{what}, unpacked,"),
@@ -166,9 +175,20 @@ fn check_stream(compressor: Compressor, stored: &[u8], max_bytes: u64, what: &st
     Ok(())
 }
 
-/// Bytes that come out, counted up to one more than allowed and not kept.
-fn n_unpacked(unpacked: impl Read, max_bytes: u64) -> io::Result<u64> {
-    io::copy(&mut unpacked.take(max_bytes.saturating_add(1)), &mut io::sink())
+/// Bytes that come out, counted up to one more than allowed and not kept; on a fault, those that came before.
+///
+/// The stored bytes are in memory, so that all faults are damage.
+fn n_unpacked(decoder: impl Read, max_bytes: u64) -> Result<u64, (u64, Damage)> {
+    let mut unpacked = decoder.take(max_bytes.saturating_add(1));
+    let (mut n_bytes, mut chunk) = (0, [0; 8192]);
+    loop {
+        match unpacked.read(&mut chunk) {
+            Ok(0) => return Ok(n_bytes),
+            Ok(n) => n_bytes += n as u64,
+            Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => return Err((n_bytes, Damage::CutOff)),
+            Err(_) => return Err((n_bytes, Damage::Corrupt)),
+        }
+    }
 }
 
 /// What the header of a blosc buffer claims; the decoder allocates and checks by it.

@@ -7,6 +7,7 @@ use zarrs::storage::{ReadableStorage, ReadableStorageTraits};
 use super::image::VolumeAxes;
 use super::metadata::ArrayMetadata;
 use crate::ReadError;
+use crate::error::bytes;
 use crate::limits::Shape;
 use crate::samples::Sample;
 
@@ -86,13 +87,13 @@ impl Reader<'_> {
             }
         }
         let what = format!("chunk {indices:?}");
-        let fault = |e: Box<dyn std::error::Error + Send + Sync>| ReadError::decoder(&what, e);
-        let stored = self.array.retrieve_encoded_chunk(&indices).map_err(|e| fault(e.into()))?;
+        let stored = self.array.retrieve_encoded_chunk(&indices).map_err(|e| ReadError::decoder(&what, e))?;
         let Some(stored) = stored else { return Ok(()) };
+        let named = format!("{what} of {} stored", bytes(stored.len()));
         let (chunk_shape, sample_bytes) = (&self.metadata.chunk_shape, size_of::<T>() as u64);
         self.metadata.packing.check(&stored, chunk_shape, sample_bytes, &what)?;
         drop(stored);
-        let samples: Vec<T> = self.array.retrieve_chunk(&indices).map_err(|e| fault(e.into()))?;
+        let samples: Vec<T> = self.array.retrieve_chunk(&indices).map_err(|e| ReadError::decoder(named, e))?;
         let n_expected = self.metadata.chunk_shape.iter().product::<u64>() as usize;
         if samples.len() != n_expected {
             return Err(ReadError::TooFewSamples { what, found: samples.len(), expected: n_expected });

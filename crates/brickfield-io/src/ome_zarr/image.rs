@@ -5,6 +5,7 @@ use serde_json::Value;
 use zarrs::storage::ReadableStorage;
 
 use super::metadata::read_json;
+use crate::error::counted;
 use crate::placement::Placement;
 use crate::{Note, ReadError};
 
@@ -76,9 +77,13 @@ impl Image {
         let values: Option<Vec<f64>> =
             transformation[field].as_array().and_then(|list| list.iter().map(Value::as_f64).collect());
         let n_axes = self.axes.len();
-        values
-            .filter(|v| v.len() == n_axes)
-            .ok_or_else(|| ReadError::field(field, &transformation[field], format!("{n_axes} numbers, one per axis")))
+        values.filter(|v| v.len() == n_axes).ok_or_else(|| {
+            ReadError::field(
+                field,
+                &transformation[field],
+                format!("{}, one per axis", counted(n_axes, "number", "numbers")),
+            )
+        })
     }
 
     /// Finds x, y and z by name; notes what is left out of longer other axes.

@@ -5,6 +5,7 @@ use serde_json::Value;
 use zarrs::storage::{ReadableStorage, StoreKey};
 
 use super::bounds::Packing;
+use crate::error::counted;
 use crate::limits::check_bytes;
 use crate::lines::MAX_HEADER_BYTES;
 use crate::{Limits, ReadError};
@@ -34,7 +35,7 @@ impl ArrayMetadata {
         };
         if metadata.shape.len() != metadata.chunk_shape.len() || metadata.chunk_shape.contains(&0) {
             let value = format!("{:?}", metadata.chunk_shape);
-            let expected = format!("{} numbers of at least 1", metadata.shape.len());
+            let expected = format!("{} of at least 1", counted(metadata.shape.len(), "number", "numbers"));
             return Err(ReadError::field("chunk shape", value, expected));
         }
         Ok(metadata)
@@ -126,5 +127,6 @@ pub(super) fn read_json(store: &ReadableStorage, key: &str) -> Result<Option<Val
         return Err(ReadError::TooLarge { what: key.to_owned(), n_bytes, max_bytes });
     }
     let Some(bytes) = store.get(&store_key).map_err(fault)? else { return Ok(None) };
-    serde_json::from_slice(&bytes).map(Some).map_err(|e| ReadError::decoder(key, e))
+    let named = || format!("{key} ({})", counted(bytes.len(), "byte", "bytes"));
+    serde_json::from_slice(&bytes).map(Some).map_err(|e| ReadError::decoder(named(), e))
 }

@@ -4,17 +4,19 @@
 //! writers are about paper. Of several channels and frames the first is read. Not: colours, palettes, packed bits.
 
 mod description;
+mod fault;
 mod tags;
 
 use std::io::{BufRead, Seek, SeekFrom};
 
+use ::tiff::ColorType;
 use ::tiff::decoder::{Decoder, DecodingResult, Limits as TiffLimits};
 use ::tiff::tags::{SampleFormat, Tag};
-use ::tiff::{ColorType, TiffError};
 use brickfield_core::glam::DVec3;
 use brickfield_core::{ScalarType, Voxels};
 
-use crate::files::{ByteSource, n_bytes_left};
+use crate::files::{ByteSource, n_bytes_left, read_head};
+use crate::format::is_tiff;
 use crate::guard::guarded;
 use crate::limits::{Shape, check_bytes};
 use crate::opened::Found;
@@ -22,6 +24,7 @@ use crate::placement::Placement;
 use crate::samples::allocate;
 use crate::{Format, Limits, Note, Opened, ReadError};
 use description::Description;
+use fault::PageNames;
 use tags::check_tags;
 
 /// Reads a TIFF stack; the outer corner of the first voxel is the world's origin.
@@ -40,25 +43,31 @@ fn read_from(source: &mut dyn ByteSource, limits: &Limits) -> Result<Opened, Rea
     if n_file_bytes == 0 {
         return Err(ReadError::Empty);
     }
-    check_tags(source, n_file_bytes)?;
-    let mut decoder = Decoder::new(source).map_err(fault)?.with_limits(header_limits());
+    let head = read_head(source, 16)?;
+    if !is_tiff(&head) {
+        return Err(ReadError::wrong_start(Format::Tiff, &head, "II or MM, then 42 or 43"));
+    }
+    let mut names = PageNames { n_file_bytes, n_pages: None };
+    check_tags(source, &names)?;
+    let mut decoder = Decoder::new(source).map_err(|e| names.tags_fault(0, e))?.with_limits(header_limits());
     let mut found = Found::pictures(Format::Tiff);
-    let first = Page::read(&mut decoder)?;
+    let first = Page::read(&mut decoder, 0, &names)?;
     let description = Description::read(&decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap_or_default());
     let spacing = spacing(&mut decoder, &description);
     first.check_length(n_file_bytes, limits)?;
-    let pages = list_pages(&mut decoder, &first, &mut found.notes)?;
-    let slices = slices(&pages, &description, &mut found.notes)?;
+    names.n_pages = description.order.as_ref().map(|order| order.n_pages());
+    let pages = list_pages(&mut decoder, &first, &names)?;
+    names.n_pages = Some(pages.n_pages as u64);
+    if pages.n_reduced() > 0 {
+        found.notes.push(Note::PagesSkipped { n_pages: pages.n_reduced() });
+    }
+    let slices = slices(&pages.like_first, &description, &mut found.notes)?;
     let dims = [first.width.into(), first.height.into(), slices.len() as u64];
     let shape = Shape::claim(dims, first.scalar, limits)?;
     let grid = Placement::axis_aligned(spacing, 0.5 * spacing).grid(shape.dims)?;
-    let voxels = read_pages(decoder.with_limits(first.limits(limits)), &slices, &shape)?;
+    let voxels = read_pages(decoder.with_limits(first.limits(limits)), &slices, &shape, &names)?;
     found.unit = description.unit;
     found.finish(grid, voxels)
-}
-
-fn fault(e: TiffError) -> ReadError {
-    ReadError::decoder("a TIFF page", e)
 }
 
 /// Tables of strips may be long; nothing is decoded while pages are listed.
@@ -78,7 +87,8 @@ struct Page {
 }
 
 impl Page {
-    fn read(decoder: &mut PageDecoder) -> Result<Page, ReadError> {
+    fn read(decoder: &mut PageDecoder, page: usize, names: &PageNames) -> Result<Page, ReadError> {
+        let fault = |e| names.tags_fault(page, e);
         let (width, height) = decoder.dimensions().map_err(fault)?;
         let bits = match decoder.colortype().map_err(fault)? {
             ColorType::Gray(bits) => bits,
@@ -134,30 +144,36 @@ impl Page {
 /// More than LZW, deflate and packed bits can expand.
 const MAX_RATIO: u128 = 4096;
 
-/// Numbers of the pages that are like the first; reduced copies are left out.
-fn list_pages(decoder: &mut PageDecoder, first: &Page, notes: &mut Vec<Note>) -> Result<Vec<usize>, ReadError> {
-    let mut pages = vec![0];
-    let mut n_reduced = 0;
-    for i in 1.. {
-        if !decoder.more_images() {
-            break;
-        }
-        decoder.next_image().map_err(fault)?;
-        let subfile_type = decoder.find_tag_unsigned::<u32>(Tag::NewSubfileType).map_err(fault)?.unwrap_or(0);
-        if subfile_type & 1 == 1 {
-            n_reduced += 1;
+struct PageList {
+    n_pages: usize,
+    /// Numbers from 0 of the pages that are like the first; reduced copies are left out.
+    like_first: Vec<usize>,
+}
+
+impl PageList {
+    fn n_reduced(&self) -> usize {
+        self.n_pages - self.like_first.len()
+    }
+}
+
+fn list_pages(decoder: &mut PageDecoder, first: &Page, names: &PageNames) -> Result<PageList, ReadError> {
+    let mut pages = PageList { n_pages: 1, like_first: vec![0] };
+    while decoder.more_images() {
+        let i = pages.n_pages;
+        pages.n_pages += 1;
+        let before = decoder.ifd_pointer();
+        decoder.next_image().map_err(|e| names.next_fault(i, decoder, before, e))?;
+        let subfile_type = decoder.find_tag_unsigned::<u32>(Tag::NewSubfileType);
+        if subfile_type.map_err(|e| names.tags_fault(i, e))?.unwrap_or(0) & 1 == 1 {
             continue;
         }
-        let page = Page::read(decoder)?;
+        let page = Page::read(decoder, i, names)?;
         if page != *first {
-            let value = format!("{} x {} {} (page {i})", page.width, page.height, page.scalar);
+            let value = format!("{} x {} {} ({})", page.width, page.height, page.scalar, names.page(i));
             let expected = format!("{} x {} {}, as the first page", first.width, first.height, first.scalar);
             return Err(ReadError::field("page", value, expected));
         }
-        pages.push(i);
-    }
-    if n_reduced > 0 {
-        notes.push(Note::PagesSkipped { n_pages: n_reduced });
+        pages.like_first.push(i);
     }
     Ok(pages)
 }
@@ -199,28 +215,33 @@ fn resolution(decoder: &mut PageDecoder, tag: Tag) -> Option<f64> {
     }
 }
 
-fn read_pages(mut decoder: PageDecoder, slices: &[usize], shape: &Shape) -> Result<Voxels, ReadError> {
+fn read_pages(
+    mut decoder: PageDecoder,
+    slices: &[usize],
+    shape: &Shape,
+    names: &PageNames,
+) -> Result<Voxels, ReadError> {
     let n_page = shape.dims.x as usize * shape.dims.y as usize;
     let mut voxels = None;
     for page in slices {
-        decoder.seek_to_image(*page).map_err(fault)?;
-        let samples = decoder.read_image().map_err(fault)?;
+        decoder.seek_to_image(*page).map_err(|e| names.tags_fault(*page, e))?;
+        let samples = decoder.read_image().map_err(|e| names.samples_fault(*page, &mut decoder, e))?;
         // Allocated when the first page has been decoded, so that a page which cannot be costs nothing.
         let voxels = match &mut voxels {
             Some(voxels) => voxels,
             None => voxels.insert(allocate(shape)?),
         };
-        append_page(voxels, samples, n_page, *page)?;
+        append_page(voxels, samples, n_page, &names.page(*page))?;
     }
     voxels.ok_or(ReadError::Missing { field: "a page" })
 }
 
-fn append_page(voxels: &mut Voxels, samples: DecodingResult, n_page: usize, page: usize) -> Result<(), ReadError> {
+fn append_page(voxels: &mut Voxels, samples: DecodingResult, n_page: usize, page: &str) -> Result<(), ReadError> {
     macro_rules! append {
         ($out:expr, $samples:expr) => {{
             let found = $samples.len();
             if found != n_page {
-                return Err(ReadError::TooFewSamples { what: format!("page {page}"), found, expected: n_page });
+                return Err(ReadError::TooFewSamples { what: page.to_owned(), found, expected: n_page });
             }
             $out.extend_from_slice(&$samples);
         }};
@@ -236,7 +257,7 @@ fn append_page(voxels: &mut Voxels, samples: DecodingResult, n_page: usize, page
         (Voxels::F64(out), DecodingResult::F64(s)) => append!(out, s),
         (voxels, _) => {
             let expected = format!("{}, as its tags say", voxels.scalar_type());
-            return Err(ReadError::field("page", format!("{page} of another sample type"), expected));
+            return Err(ReadError::field(page, "of another sample type", expected));
         }
     }
     Ok(())

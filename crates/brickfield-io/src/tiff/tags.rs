@@ -2,6 +2,7 @@
 
 use std::io::{self, SeekFrom};
 
+use super::fault::PageNames;
 use crate::ReadError;
 use crate::files::ByteSource;
 
@@ -22,12 +23,20 @@ impl Numbers<'_> {
     }
 }
 
-/// Refuses a first directory with a tag of more values than the file has bytes; leaves all other faults to the decoder.
-pub(super) fn check_tags(source: &mut dyn ByteSource, n_file_bytes: u64) -> Result<(), ReadError> {
+/// Refuses a first directory beyond the end of the file, and one with a tag of more values than the file has bytes;
+/// leaves all other faults to the decoder. The source is then at its start.
+pub(super) fn check_tags(source: &mut dyn ByteSource, names: &PageNames) -> Result<(), ReadError> {
     source.seek(SeekFrom::Start(0)).map_err(|e| ReadError::io("the file", e))?;
-    // A file that ends before its directory does is the decoder's to refuse.
-    let longest = longest_tag(source).unwrap_or(0);
+    // A file that ends within its directory is the decoder's to refuse.
+    let mut directory = Directory::default();
+    let _ = directory.read(source);
     source.seek(SeekFrom::Start(0)).map_err(|e| ReadError::io("the file", e))?;
+    let (n_file_bytes, longest) = (names.n_file_bytes, directory.longest_tag);
+    match directory.start {
+        None => return Err(ReadError::EndsWithin { part: "the TIFF header".to_owned(), n_file_bytes, end: None }),
+        Some(start) if start >= n_file_bytes => return Err(names.ends_before_tags(0, start)),
+        Some(_) => {}
+    }
     if longest > n_file_bytes {
         let expected = format!("at most {n_file_bytes}, the file's bytes");
         return Err(ReadError::field("number of a tag's values", longest, expected));
@@ -35,23 +44,32 @@ pub(super) fn check_tags(source: &mut dyn ByteSource, n_file_bytes: u64) -> Resu
     Ok(())
 }
 
-/// Most values of any tag of the first directory (TIFF 6.0, section 2; BigTIFF has wider counts and offsets).
-fn longest_tag(source: &mut dyn ByteSource) -> io::Result<u64> {
-    let mut order = [0; 2];
-    source.read_exact(&mut order)?;
-    let mut numbers = Numbers { source, is_big_endian: order == *b"MM" };
-    let is_big = numbers.number(2)? == 43;
-    if is_big {
-        numbers.number(4)?;
+/// What is known of the first directory (TIFF 6.0, section 2; BigTIFF has wider counts and offsets).
+#[derive(Default)]
+struct Directory {
+    start: Option<u64>,
+    /// Most values of any tag.
+    longest_tag: u64,
+}
+
+impl Directory {
+    /// On an error, what has been read so far is known.
+    fn read(&mut self, source: &mut dyn ByteSource) -> io::Result<()> {
+        let mut order = [0; 2];
+        source.read_exact(&mut order)?;
+        let mut numbers = Numbers { source, is_big_endian: order == *b"MM" };
+        let is_big = numbers.number(2)? == 43;
+        if is_big {
+            numbers.number(4)?;
+        }
+        let (n_offset, n_entries) = if is_big { (8, 8) } else { (4, 2) };
+        let start = *self.start.insert(numbers.number(n_offset)?);
+        numbers.source.seek(SeekFrom::Start(start))?;
+        for _ in 0..numbers.number(n_entries)? {
+            numbers.number(4)?;
+            self.longest_tag = self.longest_tag.max(numbers.number(n_offset)?);
+            numbers.number(n_offset)?;
+        }
+        Ok(())
     }
-    let (n_offset, n_entries) = if is_big { (8, 8) } else { (4, 2) };
-    let directory = numbers.number(n_offset)?;
-    numbers.source.seek(SeekFrom::Start(directory))?;
-    let mut longest = 0;
-    for _ in 0..numbers.number(n_entries)? {
-        numbers.number(4)?;
-        longest = longest.max(numbers.number(n_offset)?);
-        numbers.number(n_offset)?;
-    }
-    Ok(longest)
 }

@@ -5,9 +5,10 @@ use std::io::{self, Read};
 use flate2::read::ZlibDecoder;
 
 use super::document::WordSize;
-use crate::deflate::check_ratio;
+use crate::deflate::{Unpacked, check_ratio};
+use crate::error::Damage;
 use crate::limits::Shape;
-use crate::samples::fill;
+use crate::samples::fill_named;
 use crate::stored::check_length;
 use crate::{ByteOrder, ReadError};
 
@@ -23,8 +24,9 @@ impl WordReader<'_> {
     fn next(&mut self) -> Result<u64, ReadError> {
         let mut bytes = [0; 8];
         let n_expected = self.size.n_bytes();
-        let n = fill(self.reader, &mut bytes[..n_expected]).map_err(|e| ReadError::io(self.what, e))?;
-        check_length(self.what, n as u64, n_expected as u128)?;
+        let what = format!("a word of the header of {}", self.what);
+        let n = fill_named(self.reader, &mut bytes[..n_expected], &what)?;
+        check_length(&what, n as u64, n_expected as u128)?;
         Ok(match (self.order, self.size) {
             (ByteOrder::Little, _) => u64::from_le_bytes(bytes),
             (ByteOrder::Big, WordSize::Eight) => u64::from_be_bytes(bytes),
@@ -65,6 +67,8 @@ pub(super) struct Blocks<'a> {
     sizes: Vec<(u64, u64)>,
     block: Vec<u8>,
     n_given: usize,
+    /// What is wrong after the bytes of the block, which are given all the same.
+    fault: Option<io::Error>,
 }
 
 /// The header of compressed data: number of blocks, their size, the size of a partial last one, compressed sizes.
@@ -88,19 +92,22 @@ pub(super) fn read_blocks<'a>(mut words: WordReader<'a>, n_left: u64, shape: &Sh
         sizes.push((words.next()?, n));
     }
     sizes.reverse();
-    Ok(Blocks { source: words.reader, sizes, block: Vec::new(), n_given: 0 })
+    Ok(Blocks { source: words.reader, sizes, block: Vec::new(), n_given: 0, fault: None })
 }
 
 impl Blocks<'_> {
-    fn decode_next(&mut self, n_compressed: u64, n_bytes: u64) -> io::Result<()> {
+    fn decode_next(&mut self, n_compressed: u64, expected_bytes: u64) -> io::Result<()> {
         self.block.clear();
         self.n_given = 0;
         let mut compressed = (&mut *self.source).take(n_compressed);
-        ZlibDecoder::new(&mut compressed).take(n_bytes).read_to_end(&mut self.block)?;
-        if self.block.len() as u64 != n_bytes {
-            let message = format!("a block holds {} bytes; {n_bytes} are promised", self.block.len());
-            return Err(io::Error::new(io::ErrorKind::InvalidData, message));
+        let mut unpacked = Unpacked(ZlibDecoder::new(&mut compressed));
+        (&mut unpacked).take(expected_bytes).read_to_end(&mut self.block)?;
+        let n_bytes = self.block.len() as u64;
+        if n_bytes != expected_bytes {
+            return Err(Damage::ShortBlock { n_bytes, expected_bytes }.into());
         }
+        // At the end is the checksum: a block that disagrees with it is not given.
+        unpacked.read(&mut [0]).inspect_err(|_| self.block.clear())?;
         io::copy(&mut compressed, &mut io::sink()).map(|_| ())
     }
 }
@@ -108,8 +115,11 @@ impl Blocks<'_> {
 impl Read for Blocks<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         while self.n_given == self.block.len() {
+            if let Some(fault) = self.fault.take() {
+                return Err(fault);
+            }
             match self.sizes.pop() {
-                Some((n_compressed, n_bytes)) => self.decode_next(n_compressed, n_bytes)?,
+                Some((n_compressed, n_bytes)) => self.fault = self.decode_next(n_compressed, n_bytes).err(),
                 None => return Ok(0),
             }
         }

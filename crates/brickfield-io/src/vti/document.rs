@@ -6,7 +6,7 @@ use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
 
 use crate::error::Shown;
-use crate::files::ByteSource;
+use crate::files::{ByteSource, n_bytes_left, read_head};
 use crate::lines::{MAX_HEADER_BYTES, numbers};
 use crate::{ByteOrder, Format, ReadError};
 
@@ -61,6 +61,8 @@ pub(super) struct Document {
     appended: Option<(Storage, u64)>,
     has_piece: bool,
     support: Option<Support>,
+    /// The length of a file that ends before its root element does.
+    cut_off_at: Option<u64>,
 }
 
 /// What an element asks of the reader.
@@ -73,38 +75,30 @@ enum Next {
 impl Document {
     /// Reads the document up to its end or to appended data.
     pub(super) fn read(source: &mut dyn ByteSource) -> Result<Document, ReadError> {
-        source.seek(SeekFrom::Start(0)).map_err(|e| ReadError::io("the document", e))?;
-        let mut reader = Reader::from_reader(Metered { source, n_bytes_left: MAX_HEADER_BYTES });
-        reader.config_mut().check_end_names = false;
-        let mut document: Option<Document> = None;
-        let mut buffer = Vec::new();
-        loop {
-            buffer.clear();
-            let event = reader.read_event_into(&mut buffer).map_err(|e| ReadError::decoder("the XML document", e))?;
-            let next = match &event {
-                Event::Eof => break,
-                Event::Start(e) | Event::Empty(e) => element(&mut document, e, reader.buffer_position())?,
-                Event::End(e) => end(&mut document, e.name().as_ref()),
-                _ => Next::Go,
-            };
-            match (next, event) {
-                (Next::SkipText, Event::Start(_)) => {
-                    skip_text(&mut reader).map_err(|e| ReadError::io("the document", e))?
-                }
-                (Next::FindAppended(storage), _) => {
-                    let start = find_underscore(&mut reader)?;
-                    if let Some(document) = &mut document {
-                        document.appended = Some((storage, start));
-                    }
-                    break;
-                }
-                _ => {}
-            }
-        }
-        let document = document.ok_or(ReadError::Missing { field: "the element VTKFile" })?;
+        let rewind = |source: &mut dyn ByteSource| {
+            source.seek(SeekFrom::Start(0)).map(|_| ()).map_err(|e| ReadError::io("the document", e))
+        };
+        rewind(source)?;
+        let n_file_bytes = n_bytes_left(source)?;
+        let head = read_head(source, 4096)?;
+        rewind(source)?;
+        let mut document = None;
+        let outcome = read_elements(source, n_file_bytes, &mut document);
+        let Some(document) = document else {
+            return Err(no_root(outcome, &head));
+        };
+        outcome?;
         match document.has_piece {
             true => Ok(document),
-            false => Err(ReadError::Missing { field: "the element Piece" }),
+            false => Err(document.missing("the element Piece")),
+        }
+    }
+
+    /// What is not there, or would have been if the file went on.
+    fn missing(&self, field: &'static str) -> ReadError {
+        match self.cut_off_at {
+            None => ReadError::Missing { field },
+            Some(n_file_bytes) => ends_within_document(n_file_bytes),
         }
     }
 
@@ -113,7 +107,7 @@ impl Document {
             ("ascii", _) => Ok(Storage::Text),
             ("binary", _) => Ok(Storage::Base64),
             ("appended", Some((storage, _))) => Ok(storage),
-            ("appended", None) => Err(ReadError::Missing { field: "the element AppendedData" }),
+            ("appended", None) => Err(self.missing("the element AppendedData")),
             (other, _) => Err(ReadError::unsupported("DataArray format", other, "ascii, binary and appended are")),
         }
     }
@@ -163,6 +157,7 @@ impl Document {
             appended: None,
             has_piece: false,
             support: None,
+            cut_off_at: None,
         })
     }
 
@@ -195,6 +190,75 @@ impl Document {
             offset: integer(e, "offset")?.unwrap_or(0),
         });
         Ok(())
+    }
+}
+
+/// Reads elements up to the end or to appended data into the document, which the first of them makes.
+fn read_elements(
+    source: &mut dyn ByteSource,
+    n_file_bytes: u64,
+    document: &mut Option<Document>,
+) -> Result<(), ReadError> {
+    let mut reader = Reader::from_reader(Metered { source, n_bytes_left: MAX_HEADER_BYTES });
+    reader.config_mut().check_end_names = false;
+    let mut buffer = Vec::new();
+    let mut is_closed = false;
+    loop {
+        buffer.clear();
+        let event = reader.read_event_into(&mut buffer).map_err(|e| xml_fault(e, n_file_bytes))?;
+        let next = match &event {
+            Event::Eof => break,
+            Event::Start(e) | Event::Empty(e) => element(document, e, reader.buffer_position())?,
+            Event::End(e) => end(document, e.name().as_ref()),
+            _ => Next::Go,
+        };
+        is_closed |= closes_root(&event);
+        match (next, event) {
+            (Next::SkipText, Event::Start(_)) => {
+                skip_text(&mut reader).map_err(|e| ReadError::io("the document", e))?
+            }
+            (Next::FindAppended(storage), _) => {
+                let start = find_underscore(&mut reader)?;
+                if let Some(document) = document {
+                    document.appended = Some((storage, start));
+                }
+                return Ok(());
+            }
+            _ => {}
+        }
+    }
+    if let Some(document) = document {
+        document.cut_off_at = (!is_closed).then_some(n_file_bytes);
+    }
+    Ok(())
+}
+
+fn closes_root(event: &Event) -> bool {
+    match event {
+        Event::End(e) => e.name().as_ref() == "VTKFile",
+        Event::Empty(e) => e.name().as_ref() == "VTKFile",
+        _ => false,
+    }
+}
+
+fn ends_within_document(n_file_bytes: u64) -> ReadError {
+    ReadError::EndsWithin { part: "the XML document".to_owned(), n_file_bytes, end: None }
+}
+
+/// All syntax errors of `quick-xml` are that something is not closed when the file ends.
+fn xml_fault(fault: quick_xml::Error, n_file_bytes: u64) -> ReadError {
+    match fault {
+        quick_xml::Error::Syntax(_) => ends_within_document(n_file_bytes),
+        other => ReadError::decoder("the XML document", other),
+    }
+}
+
+/// Why there is no root element: the fault that was found, but only where the file begins as XML of VTK does.
+fn no_root(outcome: Result<(), ReadError>, head: &[u8]) -> ReadError {
+    match outcome {
+        Err(fault @ ReadError::WrongMagic { .. }) => fault,
+        Err(fault) if Format::from_magic(head) == Some(Format::Vti) => fault,
+        _ => ReadError::wrong_start(Format::Vti, head, "XML with the root element VTKFile"),
     }
 }
 

@@ -2,10 +2,11 @@
 
 use std::io::{self, BufRead, Read};
 
-use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use base64::{DecodeError, Engine};
 
+use crate::error::{Damage, Shown};
 use crate::files::ByteSource;
 
 /// The source up to the next `<`, where it ends.
@@ -53,11 +54,13 @@ pub(super) struct Base64Reader<R> {
     text: R,
     decoded: Vec<u8>,
     n_given: usize,
+    /// What is wrong after the decoded bytes, which are given all the same.
+    fault: Option<Damage>,
 }
 
 impl<R: BufRead> Base64Reader<R> {
     pub(super) fn new(text: R) -> Base64Reader<R> {
-        Base64Reader { text, decoded: Vec::new(), n_given: 0 }
+        Base64Reader { text, decoded: Vec::new(), n_given: 0, fault: None }
     }
 
     fn refill(&mut self) -> io::Result<()> {
@@ -73,26 +76,49 @@ impl<R: BufRead> Base64Reader<R> {
         }
         self.decoded.clear();
         self.n_given = 0;
-        decode_runs(&symbols, &mut self.decoded)
+        self.fault = decode_runs(&symbols, &mut self.decoded).err();
+        Ok(())
     }
 }
 
 /// Each run ends with the quad that has padding, or with the last one.
-fn decode_runs(mut symbols: &[u8], out: &mut Vec<u8>) -> io::Result<()> {
+fn decode_runs(mut symbols: &[u8], out: &mut Vec<u8>) -> Result<(), Damage> {
     while !symbols.is_empty() {
         let padded = symbols.iter().position(|b| *b == b'=');
         let end = padded.map_or(symbols.len(), |i| (i / 4 * 4 + 4).min(symbols.len()));
         let (run, rest) = symbols.split_at(end);
-        ENGINE.decode_vec(run, out).map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e))?;
+        decode_run(run, out)?;
         symbols = rest;
     }
     Ok(())
 }
 
+/// Decodes a run; of a wrong one, the quads before what is wrong.
+fn decode_run(run: &[u8], out: &mut Vec<u8>) -> Result<(), Damage> {
+    let n_before = out.len();
+    let Err(fault) = ENGINE.decode_vec(run, out) else { return Ok(()) };
+    let (n_good, damage) = match fault {
+        DecodeError::InvalidByte(at, symbol) => {
+            let found = Shown::new(char::from(symbol));
+            (at.min(run.len()), Damage::NotBase64 { found })
+        }
+        _ => (run.len(), Damage::Base64CutOff),
+    };
+    out.truncate(n_before);
+    // Whole quads of good symbols: this cannot fail, and if it did, the damage would be the same.
+    let _ = ENGINE.decode_vec(&run[..n_good / 4 * 4], out);
+    Err(damage)
+}
+
 impl<R: BufRead> Read for Base64Reader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if self.n_given == self.decoded.len() {
+        if self.n_given == self.decoded.len() && self.fault.is_none() {
             self.refill()?;
+        }
+        if self.n_given == self.decoded.len()
+            && let Some(fault) = self.fault.take()
+        {
+            return Err(fault.into());
         }
         let n = (&self.decoded[self.n_given..]).read(buffer)?;
         self.n_given += n;

@@ -56,6 +56,24 @@ pub(crate) fn gzip(bytes: &[u8]) -> Vec<u8> {
     gz.finish().unwrap()
 }
 
+/// A gzip of one stored block: 10 bytes of header, 5 of the block's, the bytes as they are, 8 of checksum and length.
+#[cfg(feature = "gzip")]
+pub(crate) fn gzip_unpressed(bytes: &[u8]) -> Vec<u8> {
+    use std::io::Write;
+    let mut gz = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::none());
+    gz.write_all(bytes).unwrap();
+    gz.finish().unwrap()
+}
+
+/// A zlib stream of one stored block: 2 bytes of header, 5 of the block's, the bytes as they are, 4 of checksum.
+#[cfg(feature = "gzip")]
+pub(crate) fn zlib_unpressed(bytes: &[u8]) -> Vec<u8> {
+    use std::io::Write;
+    let mut z = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::none());
+    z.write_all(bytes).unwrap();
+    z.finish().unwrap()
+}
+
 #[cfg(feature = "gzip")]
 pub(crate) fn zlib(bytes: &[u8]) -> Vec<u8> {
     use std::io::Write;

@@ -243,12 +243,14 @@ fn uneven_spacing_is_told_with_all_positions() {
 
 #[test]
 fn a_damaged_slice_is_not_left_out() {
-    let [first, mut cut, last] = [0.0, 1.0, 2.0].map(|z| Slice::at(z).bytes());
-    cut.truncate(cut.len() - 5);
-    let names = ["a", "b", "c"].map(str::to_owned);
-    let files = crate::common::files([("a", first), ("b", cut), ("c", last)]);
-    let fault = dicom::read(&names, &files, &LIMITS).unwrap_err().to_string();
-    assert!(fault.contains("slice \"b\"") && fault.contains("length of element (7fe0,0010)"), "{fault}");
+    for (n_cut, part) in [(5, "length of element (7fe0,0010)"), (18, "ends within the element after")] {
+        let [first, mut cut, last] = [0.0, 1.0, 2.0].map(|z| Slice::at(z).bytes());
+        cut.truncate(cut.len() - n_cut);
+        let names = ["a", "b", "c"].map(str::to_owned);
+        let files = crate::common::files([("a", first), ("b", cut), ("c", last)]);
+        let fault = dicom::read(&names, &files, &LIMITS).unwrap_err().to_string();
+        assert!(fault.contains("slice \"b\"") && fault.contains(part), "{fault}");
+    }
 }
 
 #[test]

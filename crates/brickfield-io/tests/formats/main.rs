@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod common;
+mod damaged;
 #[cfg(feature = "dicom")]
 mod dicom;
 mod metaimage;

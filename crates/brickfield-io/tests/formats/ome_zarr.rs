@@ -156,6 +156,33 @@ fn shard(parts: [Vec<u8>; 2]) -> Vec<u8> {
 const SHARDING: &str = r#"[{"name":"sharding_indexed","configuration":{"chunk_shape":[1,3,4],"codecs":[{"name":"bytes","configuration":{"endian":"little"}},{"name":"gzip","configuration":{"level":1}}],"index_codecs":[{"name":"bytes","configuration":{"endian":"little"}}],"index_location":"end"}}]"#;
 
 #[test]
+fn a_damaged_chunk_says_how_much_of_it_came() {
+    let data: Vec<u8> = (0..24).collect();
+    let packed = crate::common::gzip_unpressed(&data);
+    let refusal = |chunk: &[u8]| {
+        let entries = v2("|u1", r#"{"id":"gzip","level":1}"#, chunk.to_vec());
+        read(&entries).unwrap_err().to_string()
+    };
+    assert_eq!(
+        refusal(&packed[..10 + 5 + 9]),
+        "chunk [0, 0, 0] holds 9 bytes, then its compressed data are cut off; 24 are promised"
+    );
+    assert_eq!(
+        refusal(&packed[..packed.len() - 3]),
+        "chunk [0, 0, 0] holds the 24 bytes promised, but its compressed data are cut off at the end, where the checksum is"
+    );
+    let cut = shard([packed[..15].to_vec(), gzip(&data[12..])]);
+    assert_eq!(
+        read(&v3("uint8", "[2,3,4]", "[2,3,4]", SHARDING, &[("0/0/0", cut)])).unwrap_err().to_string(),
+        "part 1 of 2 of chunk [0, 0, 0] holds 0 bytes, then its compressed data are cut off; 12 are promised"
+    );
+    let short = read(&v2("|u1", "null", vec![0; 23])).unwrap_err().to_string();
+    assert!(short.starts_with("chunk [0, 0, 0] of 23 bytes stored: ") && short.contains("expected 24"), "{short}");
+    let json = read(&files([(".zattrs", b"{".to_vec())])).unwrap_err().to_string();
+    assert!(json.starts_with(".zattrs (1 byte): "), "{json}");
+}
+
+#[test]
 fn shards() {
     let ramp = bytes(&ramp(ScalarType::U8), ByteOrder::Little);
     let chunk = shard([gzip(&ramp[..12]), gzip(&ramp[12..])]);

@@ -34,6 +34,33 @@ fn what_is_saved_is_read_back_and_nothing_else_is_left() {
 }
 
 #[test]
+fn a_file_that_begins_like_a_known_format_is_noted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("v.raw");
+    let notes = |start: &[u8]| {
+        std::fs::write(&path, [start, &[0; 400]].concat()).unwrap();
+        let spec = RawSpec::new(UVec3::new(1, 1, start.len() as u32 + 400), ScalarType::U8);
+        let opened = open_raw(&path, &spec, &LIMITS).unwrap();
+        opened.notes.iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let begins = [
+        (&b"NRRD0004\n"[..], "NRRD"),
+        (b"NDims = 3\n", "MetaImage"),
+        (b"\x5c\x01\0\0", "NIfTI"),
+        (b"<?xml version=\"1.0\"?><VTKFile>", "VTK XML ImageData"),
+        (b"II*\0", "TIFF"),
+        (b"\x89HDF", "HDF5"),
+    ];
+    for (start, name) in begins {
+        assert_eq!(notes(start), [format!("the file begins like {name}; it is read as raw voxels, as asked")]);
+    }
+    assert_eq!(notes(&[[0; 128].as_slice(), b"DICM"].concat()).len(), 1);
+    assert_eq!(notes(b"voxels"), [] as [&str; 0]);
+    #[cfg(feature = "gzip")]
+    assert_eq!(notes(&crate::common::gzip(b"\x5c\x01\0\0")).len(), 1);
+}
+
+#[test]
 fn a_shape_beyond_the_file_or_the_limit_is_refused() {
     let refusal = |spec: RawSpec| raw::read(Cursor::new([0; 24]), &spec, &LIMITS).unwrap_err().to_string();
     let spec = RawSpec::new(DIMS, ScalarType::U16);
