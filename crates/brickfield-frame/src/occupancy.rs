@@ -15,7 +15,7 @@ pub const MACROCELL_SIDE: u32 = 2;
 ///
 /// d > 0: all macrocells of the brick less than d away are dark, that is, the transfer function is 0 over the range of their
 /// samples, so that passing over them changes no sample. d < 0: all less than -d away are visible, so that nobody need look
-/// again there. A brick's byte for a macrocell is never 0.
+/// again there. No distance is 0; in a brick of one kind all are as far as the brick is wide.
 ///
 /// Maps are compared by identity ([`Held`](crate::Held)) to tell whether a backend holds them already.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -62,7 +62,7 @@ impl Occupancy {
         &self.distances[slot as usize * n..][..n]
     }
 
-    /// All distances, brick after brick; a multiple of 64.
+    /// All distances, brick after brick; a multiple of 512.
     pub fn distances(&self) -> &[i8] {
         &self.distances
     }
@@ -90,7 +90,10 @@ mod tests {
 
     #[test]
     fn distances_are_those_of_a_search() {
-        let side = BrickSide::S16;
+        [BrickSide::S16, BrickSide::S32].into_iter().for_each(check_distances);
+    }
+
+    fn check_distances(side: BrickSide) {
         let n = Occupancy::n_macrocells(side);
         let cells: Vec<UVec3> = (0..n * n * n).map(|i| UVec3::new(i % n, i / n % n, i / n / n)).collect();
         // Few visible ones in the first brick, few dark ones in the second.
@@ -108,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn maps_of_more_than_a_gibivoxel_fit_nowhere() {
+    fn maps_of_more_than_a_gibivoxel_do_not_fit_everywhere() {
         for side in [BrickSide::S16, BrickSide::S32, BrickSide::S64] {
             let n_bricks = (1u32 << 30) / side.n_samples().pow(3);
             assert!(Occupancy::fits(side, n_bricks) && !Occupancy::fits(side, n_bricks + 1));

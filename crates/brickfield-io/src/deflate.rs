@@ -2,7 +2,7 @@
 
 use std::io::{self, BufRead, ErrorKind, Read};
 
-use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
+use flate2::bufread::{GzDecoder, ZlibDecoder};
 
 use crate::error::Damage;
 use crate::stored::note_surplus;
@@ -24,9 +24,32 @@ pub(crate) fn check_ratio(what: &str, n_compressed_bytes: u64, expected_bytes: u
 pub(crate) fn inflate<'a, R: BufRead + ?Sized>(source: &'a mut R) -> io::Result<Box<dyn Read + 'a>> {
     let is_gzip = source.fill_buf()?.first() == Some(&0x1f);
     Ok(match is_gzip {
-        true => Box::new(Unpacked(MultiGzDecoder::new(source))),
+        true => Box::new(Unpacked(Members { member: Some(GzDecoder::new(source)) })),
         false => Box::new(Unpacked(ZlibDecoder::new(source))),
     })
+}
+
+/// The members of a gzip stream, one after the other. What is behind them is no part of it, as `gzip` has it.
+struct Members<R: BufRead> {
+    /// `None` after the last one.
+    member: Option<GzDecoder<R>>,
+}
+
+impl<R: BufRead> Read for Members<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        while let Some(member) = &mut self.member {
+            let n = member.read(buffer)?;
+            if n > 0 || buffer.is_empty() {
+                return Ok(n);
+            }
+            if let Some(mut source) = self.member.take().map(GzDecoder::into_inner)
+                && source.fill_buf()?.first() == Some(&0x1f)
+            {
+                self.member = Some(GzDecoder::new(source));
+            }
+        }
+        Ok(0)
+    }
 }
 
 /// A decoder whose faults are [`Damage`].
@@ -42,8 +65,8 @@ impl<R: Read> Read for Unpacked<R> {
     }
 }
 
-/// What `flate2` means: it reports corrupt data as invalid input.
-fn damage(fault: io::Error) -> io::Error {
+/// What a decoder means: `flate2` reports corrupt data as invalid input.
+pub(crate) fn damage(fault: io::Error) -> io::Error {
     let is_of_source = fault.get_ref().is_some_and(|e| e.is::<Damage>());
     match fault.kind() {
         _ if is_of_source => fault,

@@ -15,6 +15,8 @@ use palette::{LinSrgb, Srgb};
 pub enum PictureError {
     #[error("{}: pictures are written as .exr or .png", path.display())]
     Format { path: PathBuf },
+    #[error("{}: it is a folder", path.display())]
+    IsFolder { path: PathBuf },
     #[error("{}: there is no folder {}", path.display(), folder.display())]
     NoFolder { path: PathBuf, folder: PathBuf },
     #[error("{}: {source}", path.display())]
@@ -51,14 +53,17 @@ impl PictureFormat {
 /// Whether a picture could be written: before the work of making it is done.
 ///
 /// # Errors
-/// An unknown extension, or no folder that could hold it.
+/// An unknown extension, or no folder that could hold it and may be written to.
 pub fn check_picture_path(path: &Path) -> Result<(), PictureError> {
     PictureFormat::of(path)?;
     let folder = folder_of(path);
-    if folder.is_dir() {
-        return Ok(());
+    if !folder.is_dir() {
+        return Err(PictureError::NoFolder { path: path.to_owned(), folder: folder.to_owned() });
     }
-    Err(PictureError::NoFolder { path: path.to_owned(), folder: folder.to_owned() })
+    if path.is_dir() {
+        return Err(PictureError::IsFolder { path: path.to_owned() });
+    }
+    draft(path).map(drop)
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -125,14 +130,20 @@ pub fn srgb8(pixel: [f32; 4], background: LinearRgb) -> [u8; 3] {
     [bytes.red, bytes.green, bytes.blue]
 }
 
+/// A file beside the target.
+fn draft(path: &Path) -> Result<tempfile::NamedTempFile, PictureError> {
+    let draft = tempfile::Builder::new().prefix(".brickfield").tempfile_in(folder_of(path));
+    // By kind only: tempfile's own text names a file that nobody asked for.
+    draft.map_err(|source| PictureError::Io { path: path.to_owned(), source: source.kind().into() })
+}
+
 /// Writes beside the target and renames: readers see the old file or the whole new one.
 fn atomically(
     path: &Path,
     write: impl FnOnce(&mut std::io::BufWriter<&std::fs::File>) -> Result<(), PictureError>,
 ) -> Result<(), PictureError> {
-    // By kind only: tempfile's own text names a file that nobody asked for.
-    let io = |source: std::io::Error| PictureError::Io { path: path.to_owned(), source: source.kind().into() };
-    let file = tempfile::Builder::new().prefix(".brickfield").tempfile_in(folder_of(path)).map_err(io)?;
+    let io = |source| PictureError::Io { path: path.to_owned(), source };
+    let file = draft(path)?;
     let mut writer = std::io::BufWriter::new(file.as_file());
     write(&mut writer)?;
     writer.flush().and_then(|()| writer.stream_position()).map_err(io)?;

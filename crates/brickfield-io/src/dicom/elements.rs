@@ -20,6 +20,8 @@ pub(super) enum Syntax {
     Implicit,
 }
 
+/// What is missing where a file ends within its meta group.
+pub(super) const META_END: &str = "the end of the file meta group";
 const UNDEFINED: u32 = u32::MAX;
 const ITEM: (u16, u16) = (0xfffe, 0xe000);
 const ITEM_END: (u16, u16) = (0xfffe, 0xe00d);
@@ -53,7 +55,12 @@ fn walk(source: &mut dyn ByteSource, syntax: Syntax) -> Result<u64, ReadError> {
     loop {
         nest.leave_ended(n_left);
         let Some((header, n_header_bytes)) = read_header(source, syntax)? else {
-            return if n_left == 0 || in_pixel_items { Ok(0) } else { Err(ends_within_header(source, last_tag)?) };
+            return match n_left {
+                0 => Ok(0),
+                _ if in_pixel_items => Ok(0),
+                n if is_padding(source, n)? => Ok(n),
+                _ => Err(ends_within_header(source, last_tag)?),
+            };
         };
         last_tag = Some(header.tag);
         n_left = n_left.saturating_sub(n_header_bytes);
@@ -80,6 +87,18 @@ fn walk(source: &mut dyn ByteSource, syntax: Syntax) -> Result<u64, ReadError> {
             return Ok(n_left);
         }
     }
+}
+
+/// Whether the last `n_left` bytes, which have just been read, are zeros that pad the file: too few for an element.
+fn is_padding(source: &mut dyn ByteSource, n_left: u64) -> Result<bool, ReadError> {
+    let io = |e| ReadError::io("the data set", e);
+    let mut last = [0; 8];
+    if n_left >= last.len() as u64 {
+        return Ok(false);
+    }
+    source.seek(SeekFrom::Current(-(n_left as i64))).map_err(io)?;
+    let n_read = fill(source, &mut last[..n_left as usize]).map_err(io)?;
+    Ok(last[..n_read].iter().all(|b| *b == 0))
 }
 
 /// The file ends within the tag or the length of an element.
@@ -204,7 +223,7 @@ pub(super) fn read_transfer_syntax(source: &mut dyn ByteSource) -> Result<String
     let mut n_group_bytes = read_group_length(source)?;
     let mut uid = None;
     while n_group_bytes > 0 {
-        let missing = ReadError::Missing { field: "the end of the file meta group" };
+        let missing = ReadError::Missing { field: META_END };
         let (header, n_header_bytes) = read_header(source, Syntax::ExplicitLittle)?.ok_or(missing)?;
         check_element_length(&header, n_bytes_left(source)?)?;
         n_group_bytes = n_group_bytes.saturating_sub(n_header_bytes + u64::from(header.length));

@@ -52,10 +52,8 @@ fn read_headers(names: &[String], files: &dyn DataFiles, notes: &mut Vec<Note>) 
     for name in names {
         match guarded("DICOM", || Slice::read(name, files)) {
             Ok(slice) => slices.push(slice),
-            // A slice that is damaged: without it the volume would have another shape.
-            Err(fault @ (ReadError::Field { .. } | ReadError::EndsWithin { .. })) => {
-                return Err(ReadError::decoder(format!("slice {name:?}"), fault));
-            }
+            // A file that begins as DICOM and is damaged: without it the volume would have another shape.
+            Err(fault) if is_damage(&fault) => return Err(ReadError::decoder(format!("slice {name:?}"), fault)),
             Err(fault) => skipped.push((name, fault)),
         }
     }
@@ -67,4 +65,10 @@ fn read_headers(names: &[String], files: &dyn DataFiles, notes: &mut Vec<Note>) 
         notes.push(Note::FilesSkipped { n_files, first: first.clone(), reason: fault.to_string() });
     }
     Ok(slices)
+}
+
+/// Whether a DICOM file ends too early or states what cannot be; other files are no slices.
+fn is_damage(fault: &ReadError) -> bool {
+    use ReadError::{EndsWithin, Field, Missing, Truncated};
+    matches!(fault, Field { .. } | EndsWithin { .. } | Truncated { .. } | Missing { field: elements::META_END })
 }

@@ -38,7 +38,8 @@ fn decode(slice: &Slice, files: &dyn DataFiles) -> Result<Vec<u8>, ReadError> {
 
 /// JPEG states its size once more; a decoder would allocate by it.
 fn check_fragments(object: &DefaultDicomObject, slice: &Slice) -> Result<(), ReadError> {
-    let element = object.get(tags::PIXEL_DATA).ok_or(ReadError::Missing { field: "PixelData" })?;
+    let missing = || ReadError::decoder(format!("slice {:?}", slice.name), ReadError::Missing { field: "PixelData" });
+    let element = object.get(tags::PIXEL_DATA).ok_or_else(missing)?;
     let Some(fragments) = element.fragments() else {
         let expected_bytes = slice.n_samples() as u128 * u128::from(slice.bits.n_allocated / 8);
         let n_bytes = element.to_bytes().map_or(0, |b| b.len() as u64);

@@ -8,7 +8,8 @@ use serde_json::Value;
 
 use super::metadata::numbers;
 use crate::ReadError;
-use crate::error::{Damage, bytes};
+use crate::deflate::damage;
+use crate::error::bytes;
 
 /// What compresses the bytes of a chunk, or of the parts of a shard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -161,10 +162,7 @@ fn check_stream(compressor: Compressor, stored: &[u8], max_bytes: u64, what: &st
         }
         Compressor::Blosc => Ok(blosc_bytes(stored)),
     };
-    let n_bytes = unpacked.map_err(|(n_bytes, damage)| {
-        let (what, expected_bytes) = (what.to_owned(), u128::from(max_bytes));
-        ReadError::Damaged { what, n_bytes, expected_bytes, damage }
-    })?;
+    let n_bytes = unpacked.map_err(|(n_bytes, fault)| ReadError::reading(what, n_bytes, max_bytes.into(), fault))?;
     if n_bytes > max_bytes {
         return Err(ReadError::TooLarge {
             what: format!("{what}, unpacked,"),
@@ -176,17 +174,14 @@ fn check_stream(compressor: Compressor, stored: &[u8], max_bytes: u64, what: &st
 }
 
 /// Bytes that come out, counted up to one more than allowed and not kept; on a fault, those that came before.
-///
-/// The stored bytes are in memory, so that all faults are damage.
-fn n_unpacked(decoder: impl Read, max_bytes: u64) -> Result<u64, (u64, Damage)> {
+fn n_unpacked(decoder: impl Read, max_bytes: u64) -> Result<u64, (u64, io::Error)> {
     let mut unpacked = decoder.take(max_bytes.saturating_add(1));
     let (mut n_bytes, mut chunk) = (0, [0; 8192]);
     loop {
         match unpacked.read(&mut chunk) {
             Ok(0) => return Ok(n_bytes),
             Ok(n) => n_bytes += n as u64,
-            Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => return Err((n_bytes, Damage::CutOff)),
-            Err(_) => return Err((n_bytes, Damage::Corrupt)),
+            Err(fault) => return Err((n_bytes, damage(fault))),
         }
     }
 }

@@ -18,8 +18,8 @@ pub(super) struct PageNames {
 impl PageNames {
     pub(super) fn page(&self, page: usize) -> String {
         match self.n_pages {
-            Some(n_pages) => format!("page {} of {n_pages}", page + 1),
-            None => format!("page {}", page + 1),
+            Some(n_pages) if (page as u64) < n_pages => format!("page {} of {n_pages}", page + 1),
+            _ => format!("page {}", page + 1),
         }
     }
 

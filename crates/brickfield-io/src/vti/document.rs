@@ -2,6 +2,7 @@
 
 use std::io::{self, BufRead, Read, SeekFrom};
 
+use quick_xml::errors::SyntaxError;
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
 
@@ -95,7 +96,7 @@ impl Document {
     }
 
     /// What is not there, or would have been if the file went on.
-    fn missing(&self, field: &'static str) -> ReadError {
+    pub(super) fn missing(&self, field: &'static str) -> ReadError {
         match self.cut_off_at {
             None => ReadError::Missing { field },
             Some(n_file_bytes) => ends_within_document(n_file_bytes),
@@ -245,10 +246,10 @@ fn ends_within_document(n_file_bytes: u64) -> ReadError {
     ReadError::EndsWithin { part: "the XML document".to_owned(), n_file_bytes, end: None }
 }
 
-/// All syntax errors of `quick-xml` are that something is not closed when the file ends.
+/// All syntax errors of `quick-xml` but one are that something is not closed when the file ends.
 fn xml_fault(fault: quick_xml::Error, n_file_bytes: u64) -> ReadError {
     match fault {
-        quick_xml::Error::Syntax(_) => ends_within_document(n_file_bytes),
+        quick_xml::Error::Syntax(s) if s != SyntaxError::InvalidBangMarkup => ends_within_document(n_file_bytes),
         other => ReadError::decoder("the XML document", other),
     }
 }
@@ -390,6 +391,7 @@ fn find_underscore(reader: &mut Reader<Metered>) -> Result<u64, ReadError> {
         match stream.read(&mut byte) {
             Ok(1) if byte[0] == b'_' => return Ok(stream.offset()),
             Ok(1) if byte[0].is_ascii_whitespace() => {}
+            Ok(0) => return Err(ends_within_document(stream.offset())),
             Ok(_) => return Err(ReadError::Missing { field: "the underscore at the start of AppendedData" }),
             Err(e) => return Err(ReadError::io("the document", e)),
         }

@@ -58,7 +58,7 @@ fn choose<'a>(document: &'a Document, notes: &mut Vec<Note>) -> Result<&'a Array
     let named = active.as_ref().and_then(|name| candidates(support).find(|a| a.name == *name));
     let single = || candidates(support).find(|a| a.n_components == 1 && scalar(&a.type_name).is_ok());
     let array = named.or_else(single).or_else(|| candidates(support).next());
-    let array = array.ok_or(ReadError::Missing { field: "a DataArray in PointData or CellData" })?;
+    let array = array.ok_or_else(|| document.missing("a DataArray in PointData or CellData"))?;
     if array.n_components != 1 {
         let value = format!("{} of array {}", array.n_components, array.name);
         return Err(ReadError::unsupported("NumberOfComponents", value, "1 is"));

@@ -319,3 +319,36 @@ fn lengths_beyond_the_file_are_refused_before_they_are_allocated() {
         "slice \"a\": length of element (7fe0,0010) is \"4294967280\"; expected at most the 12 bytes left"
     );
 }
+
+#[test]
+fn uneven_slices_become_even_on_a_tilted_grid_too() {
+    let slices = [0.0, 1.0, 2.0, 5.0].map(|z| Slice { position: [10.0, 20.0 + z, z], ..Slice::at(z) });
+    let opened = read(&slices).unwrap();
+    let even = opened.clone().evenly_spaced(&LIMITS);
+    let [before, after] = [&opened, &even].map(|o| o.volume.grid());
+    assert_eq!((before.dims().z, after.dims().z), (4, 6));
+    // The last slice lies where the file has it; on the median's grid it did not.
+    crate::common::assert_near(crate::common::centre(&even, 0.0, 0.0, 5.0), [10.0, 25.0, 5.0]);
+    assert_eq!(after.dims().truncate(), before.dims().truncate());
+    let n = (after.dims().x * after.dims().y) as usize;
+    let voxel = |o: &brickfield_io::Opened, slice: usize| o.volume.voxels().at(slice * n);
+    assert_eq!([voxel(&even, 1), voxel(&even, 5)], [voxel(&opened, 1), voxel(&opened, 3)]);
+    let mixed = (voxel(&opened, 2) * 2.0 + voxel(&opened, 3)) / 3.0;
+    assert!((voxel(&even, 3) - mixed).abs() <= 0.5 + 1e-9);
+}
+
+#[test]
+fn padding_behind_a_file_is_no_damage() {
+    let files = [0.0, 1.0].map(|z| Slice::at(z).bytes());
+    // A document without pixels, padded to a multiple of 8 bytes.
+    let mut document = Slice::at(2.0).bytes();
+    let pixels = document.windows(4).rposition(|w| w == [0xe0, 0x7f, 0x10, 0]).unwrap();
+    document.truncate(pixels);
+    document.extend([0; 3]);
+    let names = ["a", "b", "c"].map(str::to_owned);
+    let [first, second] = files;
+    let files = crate::common::files([("a", first), ("b", second), ("c", document)]);
+    let fault = dicom::read(&names, &files, &LIMITS).map(|o| o.volume.grid().dims().z);
+    // It has the size of a slice: that it has no pixels is told by its name.
+    assert!(fault.unwrap_err().to_string().contains("slice \"c\""));
+}

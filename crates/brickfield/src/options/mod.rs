@@ -8,7 +8,7 @@ use brickfield_bricks::{BrickTree, BuildOptions, Downsampling, build_tree_observ
 use brickfield_core::glam::{UVec2, UVec3};
 use brickfield_core::{Aabb, BrickSide, Grid, Level, LinearRgb, TransferFunction, Volume};
 use brickfield_frame::Mode;
-use brickfield_io::{Limits, OpenError, Opened, RawSpec, WorldFrame};
+use brickfield_io::{Limits, Opened, RawSpec, WorldFrame};
 use brickfield_lod::Criterion;
 use brickfield_optics::QuadratureRule;
 use clap::Args;
@@ -144,7 +144,8 @@ impl InputOptions {
         Ok(opened?)
     }
 
-    fn limits(&self) -> Limits {
+    /// What a reader may allocate.
+    pub fn limits(&self) -> Limits {
         Limits { max_bytes: self.max_mib.saturating_mul(1 << 20) }
     }
 }
@@ -160,8 +161,7 @@ impl Subject {
         tree: &TreeOptions,
         view: &ViewOptions,
     ) -> Result<Subject, OptionError> {
-        let even = |fault| OpenError { path: path.to_owned(), fault };
-        let Opened { volume, frame, notes, .. } = input.open(path)?.evenly_spaced(&input.limits()).map_err(even)?;
+        let Opened { volume, frame, notes, .. } = input.open(path)?.evenly_spaced(&input.limits());
         notes.iter().for_each(|text| note(text));
         let transfer = view.transfer(&volume)?;
         Ok(Subject { frame, tree: tree.build(&volume)?, transfer, volume })

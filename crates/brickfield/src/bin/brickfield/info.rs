@@ -11,10 +11,13 @@ use crate::{Failure, InfoArgs, print};
 
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let opened = args.input.open(&args.file)?;
-    let tree = args.tree.build(&opened.volume)?;
     let mut text = String::new();
     of_volume(&mut text, &opened)?;
-    of_tree(&mut text, &tree)?;
+    let notes = opened.notes.clone();
+    let even = opened.evenly_spaced(&args.input.limits());
+    let made = even.notes.iter().filter(|note| !notes.contains(note));
+    made.into_iter().try_for_each(|note| writeln!(text, "rendering   {note}"))?;
+    of_tree(&mut text, &args.tree.build(&even.volume)?)?;
     print(&text)
 }
 
