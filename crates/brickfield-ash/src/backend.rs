@@ -4,7 +4,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use brickfield_core::Image as Picture;
-use brickfield_frame::{Backend, Capabilities, Description, Frame, FramePlan, RenderError, ShaderFunction, Timing};
+use brickfield_frame::{
+    Backend, Capabilities, Description, Frame, FramePlan, RenderError, ShaderFunction, Timing, check_memory,
+};
 use brickfield_shaders::{Entry, ShaderLibrary, Variant, passes, pixels_per_pass};
 
 use crate::evaluate::Lists;
@@ -110,6 +112,7 @@ impl Backend for AshBackend {
         if size.max_element() > limit {
             return Err(RenderError::ImageTooLarge { size, limit });
         }
+        check_memory(size)?;
         if plan.visible.is_empty() || plan.domain.is_empty() || size.min_element() == 0 {
             return Ok(Frame { image: Picture::transparent(size), timing: Timing::default() });
         }

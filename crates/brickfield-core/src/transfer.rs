@@ -42,6 +42,8 @@ pub struct TransferFunction {
 pub enum TransferError {
     #[error("a transfer function needs at least one knot")]
     NoKnot,
+    #[error("{n_knots} knots; at most {limit} are taken")]
+    TooManyKnots { n_knots: usize, limit: usize },
     #[error("knot {knot}: {what} is {value}; it must be finite")]
     NotFinite { knot: usize, what: &'static str, value: f64 },
     #[error("knot {knot}: extinction is {value}; it must be 0 to 1e30 per world unit")]
@@ -58,13 +60,20 @@ impl TransferFunction {
     /// The greatest extinction per world unit that a knot may have: optical depths stay finite in f32.
     pub const MAX_EXTINCTION: f64 = 1e30;
 
+    /// The most knots: one for each 16-bit value.
+    pub const MAX_KNOTS: usize = 1 << 16;
+
     /// A transfer function from knots in ascending order of value.
     ///
     /// # Errors
-    /// No knot, a number that is not finite or out of its range, values that fall, three knots at one value.
+    /// No knot or too many, a number that is not finite or out of its range, values that fall, three knots at one value.
     pub fn new(knots: Vec<Knot>) -> Result<TransferFunction, TransferError> {
         if knots.is_empty() {
             return Err(TransferError::NoKnot);
+        }
+        let (n_knots, limit) = (knots.len(), TransferFunction::MAX_KNOTS);
+        if n_knots > limit {
+            return Err(TransferError::TooManyKnots { n_knots, limit });
         }
         for (knot, k) in knots.iter().enumerate() {
             check_knot(knot, k)?;
@@ -115,13 +124,20 @@ impl TransferFunction {
     /// The greatest extinction over a closed range of values; 0 exactly if nothing in the range is visible.
     pub fn max_extinction(&self, range: ValueRange) -> f64 {
         let ends = self.at(range.min).extinction.max(self.at(range.max).extinction);
-        let inside = self.knots.iter().filter(|k| range.contains(k.value)).map(|k| k.extinction);
-        inside.fold(ends, f64::max)
+        self.inside(range).iter().map(|k| k.extinction).fold(ends, f64::max)
     }
 
     /// Whether a range of values contributes nothing: its extinction is 0 everywhere.
     pub fn is_transparent(&self, range: ValueRange) -> bool {
-        self.max_extinction(range) == 0.0
+        let dark = |value| self.at(value).extinction == 0.0;
+        dark(range.min) && dark(range.max) && self.inside(range).iter().all(|k| k.extinction == 0.0)
+    }
+
+    /// The knots in a closed range of values.
+    fn inside(&self, range: ValueRange) -> &[Knot] {
+        let first = self.knots.partition_point(|k| k.value < range.min);
+        let end = self.knots.partition_point(|k| k.value <= range.max);
+        &self.knots[first..end.max(first)]
     }
 }
 
@@ -208,5 +224,6 @@ mod tests {
         assert!(error(vec![knot(0.0, -1.0)]).contains("extinction is -1"));
         assert!(error(vec![knot(1.0, 0.0), knot(0.0, 0.0)]).contains("knot 1: value 0 comes after 1"));
         assert!(error(vec![knot(1.0, 0.0); 3]).contains("third knot at value 1"));
+        assert!(error(vec![knot(1.0, 0.0); 65_537]).contains("65537 knots; at most 65536"));
     }
 }

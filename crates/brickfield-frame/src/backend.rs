@@ -139,6 +139,8 @@ pub enum RenderError {
     BufferTooLarge { what: &'static str, n_bytes: u64, limit: u64 },
     #[error("out of device memory: {what} needs {n_bytes} bytes{}", available.map(|a| format!(", the device's heap holds {a}")).unwrap_or_default())]
     OutOfMemory { what: &'static str, n_bytes: u64, available: Option<u64> },
+    #[error("no memory for a picture of {} x {} pixels, {n_bytes} bytes", size.x, size.y)]
+    NoMemory { size: UVec2, n_bytes: u64 },
     #[error("the device was lost while {doing}")]
     DeviceLost { doing: &'static str },
     #[error("this device cannot {what}")]
@@ -147,4 +149,14 @@ pub enum RenderError {
     Driver { call: &'static str, code: String },
     #[error("shader variant: {message}")]
     Shader { message: String },
+}
+
+/// Whether the host has memory for a picture.
+///
+/// # Errors
+/// If there is none.
+pub fn check_memory(size: UVec2) -> Result<(), RenderError> {
+    let n_pixels = size.x as usize * size.y as usize;
+    let n_bytes = n_pixels as u64 * size_of::<[f32; 4]>() as u64;
+    Vec::<[f32; 4]>::new().try_reserve_exact(n_pixels).map_err(|_| RenderError::NoMemory { size, n_bytes })
 }

@@ -14,7 +14,7 @@ mod plan;
 mod rays;
 mod uniform;
 
-pub use backend::{Backend, Capabilities, Description, Frame, RenderError, ShaderFunction, Timing};
+pub use backend::{Backend, Capabilities, Description, Frame, RenderError, ShaderFunction, Timing, check_memory};
 pub use beams::{Beams, Overview};
 pub use brick_set::{AtlasShape, BrickSet, BrickSetError, Decode, SampleFormat};
 pub use brickfield_optics::QuadratureRule;

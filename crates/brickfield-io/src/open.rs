@@ -142,7 +142,9 @@ fn open_file(path: &Path, format: Format, limits: &Limits) -> Result<Opened, Rea
         Format::Dicom => crate::dicom::read(&[file_name(path)], &folder, limits),
         #[cfg(feature = "tiff")]
         Format::Tiff => crate::tiff::read(file, limits),
-        Format::Raw => Err(ReadError::Missing { field: "the shape of a raw file (dims and type; see open_raw)" }),
+        Format::Raw => {
+            Err(ReadError::Missing { field: "the shape of a raw file (--raw NXxNYxNZ,TYPE, or `open_raw`)" })
+        }
         Format::OmeZarr => Err(ReadError::UnknownFormat { found: Shown::of_bytes(&read_head(&mut file, 16)?) }),
         #[allow(unreachable_patterns)]
         _ => Err(feature_off(format)),

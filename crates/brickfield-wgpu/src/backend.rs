@@ -5,7 +5,7 @@ use std::time::Instant;
 use brickfield_core::Image;
 use brickfield_core::glam::UVec2;
 use brickfield_frame::{
-    Backend, Description, Feature, Frame, FramePlan, FrameUniforms, RenderError, ShaderFunction, Timing,
+    Backend, Description, Feature, Frame, FramePlan, FrameUniforms, RenderError, ShaderFunction, Timing, check_memory,
 };
 use brickfield_shaders::{Entry, ShaderLibrary, Variant, passes, pixels_per_pass, shader_inputs, shader_outputs};
 use wgpu::{BufferUsages, Features};
@@ -123,6 +123,7 @@ impl Backend for WgpuBackend {
     fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
         let size = plan.size();
         self.check_size(size)?;
+        check_memory(size)?;
         if size.min_element() == 0 || plan.visible.is_empty() || plan.domain.is_empty() {
             return Ok(Frame { image: Image::transparent(size), timing: Timing::default() });
         }

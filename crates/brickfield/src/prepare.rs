@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use brickfield_bricks::BrickTree;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
-use brickfield_core::{Aabb, BrickId, Level};
+use brickfield_core::{Aabb, BrickId, Level, ValueRange};
 use brickfield_frame::{
     Beams, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, RayFrame, Sampling, SamplingError,
 };
@@ -25,6 +25,10 @@ pub enum PrepareError {
     Step { step_voxels: f64 },
     #[error("clip box from {} to {}: every lower corner must be below the upper one", clip.min, clip.max)]
     Clip { clip: Aabb },
+    #[error(
+        "data values from {:e} to {:e}; renderers take magnitudes and widths from {least:e} to {most:e}: rescale the data", range.min, range.max
+    )]
+    Values { range: ValueRange, least: f64, most: f64 },
     #[error("rays of {n_segments:.3e} segments; at most {limit} are possible: take a larger step or a nearer eye")]
     TooManySegments { n_segments: f64, limit: u32 },
     #[error("{n_bricks} bricks; an index tells at most {limit} apart: take larger bricks or a coarser level")]
@@ -35,6 +39,10 @@ pub enum PrepareError {
 
 /// Most pixels along a side of a picture.
 pub const MAX_IMAGE: u32 = 32_768;
+/// Greatest magnitude of data values: f32 arithmetic goes a little further.
+const MOST_VALUE: f64 = 1e30;
+/// Least width of the range of data values that are not all equal.
+const LEAST_WIDTH: f64 = 1e-30;
 /// Most segments on a ray: an f32 counts them exactly.
 pub const MAX_SEGMENTS: u32 = 1 << 24;
 
@@ -43,9 +51,10 @@ pub const MAX_SEGMENTS: u32 = 1 << 24;
 /// `residency` carries the bricks from frame to frame.
 ///
 /// # Errors
-/// A picture size, step, clip box or number of bricks out of range.
+/// A picture size, step, clip box, data value or number of bricks out of range.
 pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Result<FramePlan, PrepareError> {
     check_size(scene.size)?;
+    check_values(tree)?;
     let grid = tree.grid();
     let domain = clipped_domain(tree, scene.clip)?;
     let step_world = scene.step_voxels * grid.spacing().min_element();
@@ -106,6 +115,16 @@ fn check_size(size: UVec2) -> Result<(), PrepareError> {
         return Ok(());
     }
     Err(PrepareError::Size { size, limit: MAX_IMAGE })
+}
+
+fn check_values(tree: &BrickTree) -> Result<(), PrepareError> {
+    let range = tree.summary(tree.layout().root()).range;
+    let magnitude = range.min.abs().max(range.max.abs());
+    let is_wide = range.min == range.max || range.max - range.min >= LEAST_WIDTH;
+    if magnitude <= MOST_VALUE && is_wide {
+        return Ok(());
+    }
+    Err(PrepareError::Values { range, least: LEAST_WIDTH, most: MOST_VALUE })
 }
 
 fn check_segments(n_segments: f64) -> Result<(), PrepareError> {
@@ -225,6 +244,22 @@ mod tests {
     use super::*;
     use brickfield_bricks::{BuildOptions, build_tree};
     use brickfield_core::{Camera, Grid, Projection, TransferFunction, Volume};
+
+    #[test]
+    fn values_that_f32_does_not_hold_are_refused() {
+        let grid = Grid::axis_aligned(UVec3::splat(4), DVec3::ONE).unwrap();
+        let plan = |unit: f64| {
+            let values: Vec<f64> = (0..64).map(|i| f64::from(i) * unit).collect();
+            let tree = build_tree(&Volume::new(grid, values).unwrap(), &BuildOptions::default()).unwrap();
+            let camera = Camera::framing(&grid.world_box(), DVec3::X, DVec3::Z).unwrap();
+            let fog = TransferFunction::constant(0.1, [1.0; 3]).unwrap();
+            prepare(&tree, &Scene::new(camera, UVec2::new(4, 4), fog), &mut Residency::default())
+        };
+        assert!([1e28, 1.0, 1e-28, 0.0].into_iter().all(|unit| plan(unit).is_ok()));
+        for unit in [1e30, 1e300, -1e300, 1e-310] {
+            assert!(matches!(plan(unit), Err(PrepareError::Values { .. })), "{unit}");
+        }
+    }
 
     #[test]
     fn an_eye_so_far_that_segments_cannot_be_counted_is_refused() {

@@ -63,7 +63,7 @@ fn a_picture_is_written_and_what_the_volume_lacks_is_said() {
 }
 
 /// Arguments after `render`, the status, and what the message must hold.
-const REFUSED: [(&str, i32, &str); 17] = [
+const REFUSED: [(&str, i32, &str); 19] = [
     ("b.nrrd|-o|a.png", 1, "b.nrrd"),
     ("a.nrrd|-o|a.jpg", 2, "a.jpg: pictures are written as .exr or .png"),
     ("a.nrrd|-o|no/a.png", 2, "no/a.png: there is no folder no"),
@@ -80,6 +80,8 @@ const REFUSED: [(&str, i32, &str); 17] = [
     ("a.nrrd|-o|a.png|--clip|20:30,0:1,0:1", 2, "--clip: the box from"),
     ("a.nrrd|-o|a.png|--transfer|none such", 2, "--transfer: \"none such\""),
     ("a.nrrd|-o|a.png|--max-mib|0", 2, "--max-mib"),
+    ("a.nrrd|-o|a.png|--validation|--backend|cpu", 2, "--validation"),
+    ("a.nrrd|-o|.|--size|8x8", 2, "exr or .png"),
     ("a.nrrd|-o|a.png|--raw|99x99x99,u8", 1, "a.nrrd"),
 ];
 

@@ -67,7 +67,10 @@ impl Contest<'_> {
                 let end = if self.cases[case].priority == Priority::Normal { half } else { self.limits.end };
                 let expected = self.expected(&entries, case, rival);
                 if Instant::now() + expected > end && case > 0 {
-                    let reason = format!("it would take {:.1} s a frame: allow more --seconds", expected.as_secs_f64());
+                    let reason = match expected {
+                        Duration::ZERO => "no time was left for it: allow more --seconds".to_owned(),
+                        _ => format!("it would take {:.1} s a frame: allow more --seconds", expected.as_secs_f64()),
+                    };
                     left_out.push(self.left_out(case, rival, reason));
                     continue;
                 }

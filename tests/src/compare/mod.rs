@@ -39,6 +39,8 @@ pub enum CompareError {
     Output(#[from] OutputError),
     #[error("{backend} is required and absent: {reason}")]
     Required { backend: String, reason: String },
+    #[error("no backend to compare: {reasons}")]
+    NoBackend { reasons: String },
     #[error("no measurement succeeded; the first reason: {reason}")]
     Nothing { reason: String },
 }
@@ -49,7 +51,7 @@ impl CompareError {
         match self {
             CompareError::Options(e) if e.is_usage() => 2,
             CompareError::Prepare(_) => 2,
-            CompareError::Required { .. } => 3,
+            CompareError::Required { .. } | CompareError::NoBackend { .. } => 3,
             CompareError::Options(_) | CompareError::Output(_) | CompareError::Nothing { .. } => 1,
         }
     }
@@ -64,6 +66,7 @@ pub fn compare(args: &CompareArgs) -> Result<Report, CompareError> {
     let output = Output::new(&args.out)?;
     let mut rivals = Rivals::open(&args.backends, args.adapter.as_deref());
     rivals.check_required(&args.require)?;
+    rivals.check_any()?;
     let exhibit = subject::exhibit(args)?;
     let cases = sweep::cases(args, &exhibit)?;
     let (answer, reference) = answer(args, &exhibit, &output)?;

@@ -21,6 +21,8 @@ pub enum OutputError {
     Io { path: PathBuf, source: io::Error },
     #[error("--out {}: it has an images/ but no report.json, so it is not a comparison's; choose another folder", path.display())]
     Foreign { path: PathBuf },
+    #[error("--out {}: its {name} is a folder; choose another folder", path.display())]
+    IsFolder { path: PathBuf, name: &'static str },
     #[error(transparent)]
     Picture(#[from] PictureError),
     #[error("index.html: {0}")]
@@ -46,6 +48,9 @@ impl Output {
         std::fs::create_dir_all(out).map_err(io)?;
         if out.join("images").exists() && !out.join("report.json").exists() {
             return Err(OutputError::Foreign { path: out.to_owned() });
+        }
+        if let Some(name) = ["index.html", "report.json"].into_iter().find(|name| out.join(name).is_dir()) {
+            return Err(OutputError::IsFolder { path: out.to_owned(), name });
         }
         let draft = tempfile::Builder::new().prefix(".draft").tempdir_in(out).map_err(io)?;
         std::fs::create_dir(draft.path().join("images")).map_err(io)?;

@@ -35,6 +35,16 @@ impl Rivals {
     }
 
     /// # Errors
+    /// If no backend is there at all: why each is absent.
+    pub(super) fn check_any(&self) -> Result<(), CompareError> {
+        if !self.present.is_empty() {
+            return Ok(());
+        }
+        let reason = |i: &BackendInfo| format!("{}: {}", i.backend, i.absent.as_deref().unwrap_or_default());
+        Err(CompareError::NoBackend { reasons: self.infos.iter().map(reason).collect::<Vec<_>>().join("; ") })
+    }
+
+    /// # Errors
     /// The first kind of `required` that is absent or was not asked for.
     pub(super) fn check_required(&self, required: &[BackendKind]) -> Result<(), CompareError> {
         for kind in required {
@@ -68,6 +78,7 @@ mod tests {
     fn a_required_backend_that_is_absent_is_an_error() {
         let rivals = Rivals { present: vec![], infos: vec![absent(BackendKind::Ash, "no\n driver".to_owned())] };
         let error = |kind| rivals.check_required(&[kind]).unwrap_err().to_string();
+        assert_eq!(rivals.check_any().unwrap_err().to_string(), "no backend to compare: ash: no driver");
         assert_eq!(error(BackendKind::Ash), "ash is required and absent: no driver");
         assert_eq!(error(BackendKind::Cpu), "cpu is required and absent: it is not among --backends");
         let cpu = Rivals::open(&[BackendKind::Cpu, BackendKind::Cpu], None);

@@ -104,6 +104,8 @@ mutants! {
     JUMPS_TOO_FAR: "jumps-too-far", "march", "k = block_stop;" => "k = block_stop + 24.0;";
     /// A leap over dark macrocells goes 8 segments too far.
     LEAPS_TOO_FAR: "leaps-too-far", "march", "k = end;" => "k = end + 8.0;";
+    /// Of segments with two nodes, the far one may lie anywhere.
+    FAR_NODE_FORGOTTEN: "far-node-forgotten", "march", "stop = select(k, stop, own);" => "";
     /// Macrocells are taken for those of the next row.
     MACROCELL_ROW: "macrocell-row", "bricks", "at.x + n * (at.y + n * (at.z + n * block.slot))"
         => "at.y + n * (at.x + n * (at.z + n * block.slot))";

@@ -14,7 +14,8 @@ use std::time::Instant;
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{BrickSide, Image};
 use brickfield_frame::{
-    Backend, Capabilities, Description, Frame, FramePlan, IndexEntry, RenderError, SampleFormat, ShaderFunction, Timing,
+    Backend, Capabilities, Description, Frame, FramePlan, IndexEntry, RenderError, SampleFormat, ShaderFunction,
+    Timing, check_memory,
 };
 use rayon::prelude::*;
 
@@ -71,6 +72,7 @@ impl Backend for CpuBackend {
 
     fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
         check(plan)?;
+        check_memory(plan.size())?;
         if plan.visible.is_empty() || plan.domain.is_empty() {
             return Ok(Frame { image: Image::transparent(plan.size()), timing: Timing::default() });
         }

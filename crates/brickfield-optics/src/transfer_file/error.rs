@@ -12,6 +12,8 @@ use brickfield_core::TransferError;
 pub enum ReadTransferError {
     #[error("cannot read the transfer function {}: {source}", path.display())]
     Read { path: PathBuf, source: io::Error },
+    #[error("the transfer function {} has more than {limit} bytes", path.display())]
+    TooLarge { path: PathBuf, limit: u64 },
     #[error("{}: {source}", path.display())]
     Parse { path: PathBuf, source: ParseTransferError },
 }

@@ -8,7 +8,8 @@ mod error;
 mod knot;
 mod write;
 
-use std::fs;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use brickfield_core::TransferFunction;
@@ -21,6 +22,9 @@ pub use write::{WriteTransferError, write_transfer};
 
 use error::place;
 use knot::{FileKnot, PlacedKnot, transfer_of};
+
+/// Most bytes of a file: a thousand for each of the most knots.
+const MAX_FILE_BYTES: u64 = 1 << 26;
 
 /// The formats of transfer-function files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -54,12 +58,21 @@ impl TransferFormat {
 /// Reads a transfer function from a file: by its extension, or by its content where that says nothing.
 ///
 /// # Errors
-/// The file cannot be read, or as [`parse_transfer`].
+/// The file cannot be read or has more than 64 MiB, or as [`parse_transfer`].
 pub fn read_transfer(path: &Path) -> Result<TransferFunction, ReadTransferError> {
-    let text =
-        fs::read_to_string(path).map_err(|source| ReadTransferError::Read { path: path.to_path_buf(), source })?;
+    let text = read_text(path)?;
     let format = TransferFormat::of_path(path).unwrap_or_else(|| TransferFormat::of_text(&text));
     parse_transfer(&text, format).map_err(|source| ReadTransferError::Parse { path: path.to_path_buf(), source })
+}
+
+fn read_text(path: &Path) -> Result<String, ReadTransferError> {
+    let read = |source| ReadTransferError::Read { path: path.to_path_buf(), source };
+    let mut text = String::new();
+    let n_bytes = File::open(path).and_then(|f| f.take(MAX_FILE_BYTES + 1).read_to_string(&mut text)).map_err(read)?;
+    if n_bytes as u64 > MAX_FILE_BYTES {
+        return Err(ReadTransferError::TooLarge { path: path.to_path_buf(), limit: MAX_FILE_BYTES });
+    }
+    Ok(text)
 }
 
 /// A transfer function from text.

@@ -1,5 +1,7 @@
 //! Files round trip, opacities are converted once, and errors name the line.
 
+use std::fs;
+
 use super::*;
 use brickfield_core::Knot;
 use proptest::prelude::*;

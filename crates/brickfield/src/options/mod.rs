@@ -10,7 +10,7 @@ use brickfield_core::{Aabb, BrickSide, Grid, Level, LinearRgb, TransferFunction,
 use brickfield_frame::Mode;
 use brickfield_io::{Limits, Opened, RawSpec, WorldFrame};
 use brickfield_lod::Criterion;
-use brickfield_optics::QuadratureRule;
+use brickfield_optics::{Preset, QuadratureRule};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -50,18 +50,26 @@ pub struct ViewOptions {
     /// from=X,Y,Z eye=X,Y,Z target=X,Y,Z up=X,Y,Z (world units), fov=DEGREES or height=UNITS (orthographic), zoom=FACTOR
     #[arg(long, value_name = "VIEW", default_value = "oblique")]
     pub camera: Viewpoint,
-    /// Transfer function: "auto" (from the histogram), a preset's name, or a JSON or TOML file
-    #[arg(long, value_name = "TF", default_value = "auto")]
+    #[arg(long, value_name = "TF", default_value = "auto", help = transfer_help())]
+    #[allow(missing_docs)]
     pub transfer: String,
     /// Which resolution: "full", a level (0 is the finest), or "distance[=FACTOR]" (finer the nearer)
     #[arg(long, value_name = "LOD", default_value = "full", value_parser = values::detail)]
     pub lod: Criterion,
     /// Show only a part, in voxels: X0:X1,Y0:Y1,Z0:Z1
-    #[arg(long, value_name = "BOX", value_parser = values::clip)]
+    #[arg(long, value_name = "BOX", value_parser = values::clip, allow_hyphen_values = true)]
     pub clip: Option<Aabb>,
     /// Background behind the picture in PNG files, linear: R,G,B or one number for grey
     #[arg(long, value_name = "RGB", default_value = "0", value_parser = values::background)]
     pub background: Background,
+}
+
+fn transfer_help() -> String {
+    let presets = Preset::ALL.map(|p| p.name()).join(", ");
+    format!(
+        "Transfer function: auto (from the histogram), a preset ({presets}), or a JSON or TOML file of knots: \
+         {{\"knots\": [{{\"value\": 100, \"extinction\": 0, \"srgb\": \"#ffffff\"}}, ...]}}"
+    )
 }
 
 /// A linear background colour.
@@ -194,14 +202,14 @@ impl ViewOptions {
         if self.transfer == "auto" {
             return Ok(brickfield_optics::automatic(volume));
         }
-        if let Some(preset) = brickfield_optics::Preset::from_name(&self.transfer) {
+        if let Some(preset) = Preset::from_name(&self.transfer) {
             return Ok(preset.for_volume(volume)?);
         }
         let path = PathBuf::from(&self.transfer);
         if path.exists() {
             return Ok(brickfield_optics::read_transfer(&path)?);
         }
-        let presets = brickfield_optics::Preset::ALL.map(|p| p.name()).join(", ");
+        let presets = Preset::ALL.map(|p| p.name()).join(", ");
         Err(OptionError::NoSuchTransfer { name: self.transfer.clone(), presets })
     }
 

@@ -81,6 +81,13 @@ pub(super) fn shell(grid: &Grid, scalar: ScalarType) -> Volume {
     fill_unit(grid, scalar, |p| field.at(p))
 }
 
+/// A ball without a rim: dark values outside, other dark ones inside, for what sees the values between.
+pub(super) fn jump(grid: &Grid) -> Volume {
+    let center = grid.world_box().center() + 0.3;
+    let r = 0.35 * grid.world_box().extent().min_element();
+    fill_unit(grid, ScalarType::U8, |p| if p.distance(center) < r { 0.9 } else { 0.1 })
+}
+
 /// Two small balls in opposite corners of an empty volume.
 pub(super) fn sparse(grid: &Grid, scalar: ScalarType) -> Volume {
     let b = grid.world_box();

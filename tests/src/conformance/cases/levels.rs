@@ -6,7 +6,7 @@ use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickSide, Grid, Level, ScalarType, TransferFunction, Volume};
 use brickfield_optics::QuadratureRule;
 
-use super::fields::{COOL, WARM, checkers, grid, hills, knot, ramp, soft, sparse};
+use super::fields::{COOL, WARM, checkers, grid, hills, jump, knot, ramp, soft, sparse};
 use super::setup::{Setup, catches, picture};
 use crate::conformance::case::Case;
 use crate::conformance::plan_mutants::PlanMutant::*;
@@ -128,6 +128,16 @@ fn skipping() -> Vec<Case> {
             });
             cases.push(case);
         }
+    }
+    // Both nodes of a long segment may be dark and what lies between them not.
+    for rule in [QuadratureRule::PreIntegrated, QuadratureRule::Gauss2] {
+        let mutants = catches![shader::FAR_NODE_FORGOTTEN, RowsFlipped];
+        let case = picture(format!("skip/dark-on-both-sides-{}", rule.name()), mutants, move || {
+            let knots = [knot(0.3, 0.0, WARM), knot(0.5, 0.6, WARM), knot(0.7, 0.0, COOL)];
+            let transfer = spread(&knots, ScalarType::U8).expect("knots ascend");
+            Setup::new(jump(&grid()), transfer).side(BrickSide::S64).rule(rule).step(2.0)
+        });
+        cases.push(case);
     }
     cases.push(picture("skip/beams", catches![shader::BEAM_MIRRORED, shader::BEAM_HALVED], || {
         Setup::new(sparse(&grid(), ScalarType::U8), soft(ScalarType::U8)).step(0.4)

@@ -87,6 +87,13 @@ enum Failure {
     Other(Box<dyn std::error::Error>),
 }
 
+/// Calls are checked through ash only.
+#[derive(Debug, thiserror::Error)]
+#[error("--validation: backend {kind} has no validation layer; take --backend ash")]
+struct ValidationNeedsAsh {
+    kind: BackendKind,
+}
+
 impl Failure {
     fn usage(e: impl std::error::Error + 'static) -> Failure {
         Failure::Usage(Box::new(e))
@@ -149,9 +156,16 @@ impl RenderArgs {
     /// The backends to try, in order.
     fn candidates(&self) -> Result<Vec<BackendKind>, Failure> {
         if self.backend != "auto" {
-            return Ok(vec![self.backend.parse().map_err(Failure::usage)?]);
+            let kind: BackendKind = self.backend.parse().map_err(Failure::usage)?;
+            if self.validation && kind != BackendKind::Ash {
+                return Err(Failure::usage(ValidationNeedsAsh { kind }));
+            }
+            return Ok(vec![kind]);
         }
-        if self.adapter.is_some() || self.validation {
+        if self.validation {
+            return Ok(vec![BackendKind::Ash]);
+        }
+        if self.adapter.is_some() {
             return Ok(vec![BackendKind::Ash, BackendKind::Wgpu, BackendKind::Cpu]);
         }
         // A driver in software is slower than the CPU backend: it is for those who ask for it.
