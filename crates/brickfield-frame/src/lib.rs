@@ -13,6 +13,7 @@ mod pass;
 mod plan;
 mod rays;
 mod uniform;
+mod value_scale;
 
 pub use backend::{Backend, Capabilities, Description, Frame, RenderError, ShaderFunction, Timing, check_memory};
 pub use beams::{Beams, Overview};
@@ -27,3 +28,4 @@ pub use pass::Pass;
 pub use plan::{FramePlan, Mode, Sampling, SamplingError};
 pub use rays::{PlanRay, RayFrame};
 pub use uniform::{FrameUniforms, KnotUniform};
+pub use value_scale::ValueScale;

@@ -6,7 +6,7 @@ use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, TransferFunction};
 use brickfield_optics::QuadratureRule;
 
-use crate::{Beams, BrickSet, Feature, FeatureSet, IndexGrid, Occupancy, RayFrame, SampleFormat};
+use crate::{Beams, BrickSet, Feature, FeatureSet, IndexGrid, Occupancy, RayFrame, SampleFormat, ValueScale};
 
 /// Everything that a backend needs for one frame, and nothing that this frame does not need.
 #[derive(Clone, Debug)]
@@ -39,6 +39,11 @@ impl FramePlan {
     /// The last sample of the volume, in sample space: positions are clamped to [0, last].
     pub fn last_sample(&self) -> DVec3 {
         (self.dims - 1).as_dvec3()
+    }
+
+    /// How f32 arithmetic counts data values.
+    pub fn value_scale(&self) -> ValueScale {
+        ValueScale::of(&self.transfer, self.bricks.decode())
     }
 
     /// Whether shaders turn what they read of a texture back into the integers that were stored: 16-bit samples where

@@ -24,7 +24,7 @@ pub struct FrameUniforms {
     pub direction_right: [f32; 4],
     /// Change of the direction a pixel down; w: transmittance floor.
     pub direction_down: [f32; 4],
-    /// Lower corner of the domain; w: scale from a sample as it is read to a data value relative to the first knot.
+    /// Lower corner of the domain; w: scale from a sample as it is read to a number of [`ValueScale`](crate::ValueScale).
     pub domain_min: [f32; 4],
     /// Upper corner of the domain; w: offset of the same.
     pub domain_max: [f32; 4],
@@ -51,7 +51,7 @@ pub struct FrameUniforms {
 pub struct KnotUniform {
     /// Straight linear RGB; w: extinction per world unit.
     pub optics: [f32; 4],
-    /// x: data value relative to the first knot; y: reciprocal of the distance to the next knot (0 at the last and before a
+    /// x: data value as a number of [`ValueScale`](crate::ValueScale); y: reciprocal of the distance to the next knot (0 at the last and before a
     /// jump's second knot); z, w: reserved.
     pub value: [f32; 4],
 }
@@ -97,16 +97,16 @@ impl FrameUniforms {
 impl KnotUniform {
     /// The knots of a plan's transfer function.
     pub fn of(plan: &FramePlan) -> Vec<KnotUniform> {
-        let knots = plan.transfer.knots();
+        let (knots, values) = (plan.transfer.knots(), plan.value_scale());
         let reciprocal = |i: usize| match knots.get(i + 1) {
-            Some(next) if next.value > knots[i].value => 1.0 / (next.value - knots[i].value),
+            Some(next) if next.value > knots[i].value => values.unit() / (next.value - knots[i].value),
             _ => 0.0,
         };
-        knots.iter().enumerate().map(|(i, k)| knot(k, value_origin(plan), reciprocal(i))).collect()
+        knots.iter().enumerate().map(|(i, k)| knot(k, values.number(k.value), reciprocal(i))).collect()
     }
 }
 
-/// From samples as shaders read them to values relative to the first knot: (read - counted_from) * scale + offset.
+/// From samples as shaders read them to numbers of the value scale: (read - counted_from) * scale + offset.
 struct SampleScale {
     counted_from: f64,
     scale: f64,
@@ -115,28 +115,20 @@ struct SampleScale {
 
 impl SampleScale {
     fn of(plan: &FramePlan) -> SampleScale {
-        let decode = plan.bricks.decode();
-        let offset = decode.offset - value_origin(plan);
+        let (decode, values) = (plan.bricks.decode(), plan.value_scale());
+        let (scale, offset) = (decode.scale / values.unit(), values.number(decode.offset));
         if !plan.reads_integers() {
-            return SampleScale { counted_from: 0.0, scale: decode.scale, offset };
+            return SampleScale { counted_from: 0.0, scale, offset };
         }
-        let counted_from = plan.bricks.nearest_stored(value_origin(plan));
-        let scale = decode.scale / plan.bricks.format().unit();
+        let counted_from = plan.bricks.nearest_stored(values.origin());
+        let scale = scale / plan.bricks.format().unit();
         SampleScale { counted_from, scale, offset: offset + counted_from * scale }
     }
 }
 
-/// Values in shaders are relative to this one, so that f32 spends its digits on the transfer function's range.
-fn value_origin(plan: &FramePlan) -> f64 {
-    plan.transfer.knots()[0].value
-}
-
-fn knot(k: &Knot, value_origin: f64, reciprocal: f64) -> KnotUniform {
+fn knot(k: &Knot, value: f64, reciprocal: f64) -> KnotUniform {
     let [r, g, b] = k.color.map(|c| c as f32);
-    KnotUniform {
-        optics: [r, g, b, k.extinction as f32],
-        value: [(k.value - value_origin) as f32, reciprocal as f32, 0.0, 0.0],
-    }
+    KnotUniform { optics: [r, g, b, k.extinction as f32], value: [value as f32, reciprocal as f32, 0.0, 0.0] }
 }
 
 fn float4(v: DVec3, w: f64) -> [f32; 4] {

@@ -1,6 +1,7 @@
-//! The transfer function in f32: extinction and colour of values relative to the first knot.
+//! The transfer function in f32: extinction and colour of values as numbers of the value scale.
 
 use brickfield_core::{Knot, TransferFunction};
+use brickfield_frame::ValueScale;
 
 /// Extinction and straight colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -30,20 +31,19 @@ pub(super) struct Classifier {
     ends: Vec<f32>,
     bins: [u32; N_BINS],
     bins_per_value: f32,
-    /// What values are relative to.
-    pub(super) origin: f64,
+    /// How values are counted.
+    pub(super) values: ValueScale,
 }
 
 const N_BINS: usize = 256;
 
 impl Classifier {
-    pub(super) fn new(transfer: &TransferFunction) -> Classifier {
+    pub(super) fn new(transfer: &TransferFunction, values: ValueScale) -> Classifier {
         let knots = transfer.knots();
-        let origin = knots[0].value;
-        let relative = |k: &Knot| (k.value - origin) as f32;
+        let relative = |k: &Knot| values.number(k.value) as f32;
         let (first, last) = (&knots[0], &knots[knots.len() - 1]);
         let mut stretches = vec![constant(first, relative(first))];
-        stretches.extend(knots.windows(2).map(|k| linear(&k[0], &k[1], relative(&k[0]))));
+        stretches.extend(knots.windows(2).map(|k| linear(&k[0], &k[1], values)));
         stretches.push(constant(last, relative(last)));
         let mut ends: Vec<f32> = knots.iter().map(relative).collect();
         ends.push(f32::INFINITY);
@@ -52,10 +52,10 @@ impl Classifier {
         // One bin early, so that rounding cannot begin the search too late.
         let start = |bin: usize| (bin as f32 - 1.0) / bins_per_value;
         let bins = std::array::from_fn(|bin| ends.partition_point(|e| *e <= start(bin)) as u32);
-        Classifier { stretches, ends, bins, bins_per_value, origin }
+        Classifier { stretches, ends, bins, bins_per_value, values }
     }
 
-    /// Extinction and colour at a value relative to the first knot; right-continuous at jumps.
+    /// Extinction and colour at a value; right-continuous at jumps.
     #[inline(always)]
     pub(super) fn at(&self, value: f32) -> Optics32 {
         self.on(self.stretch(value), value)
@@ -134,9 +134,10 @@ fn constant(knot: &Knot, start: f32) -> Stretch {
     Stretch { start, reciprocal: 0.0, low: rgb_extinction(knot), high: rgb_extinction(knot) }
 }
 
-fn linear(low: &Knot, high: &Knot, start: f32) -> Stretch {
+fn linear(low: &Knot, high: &Knot, values: ValueScale) -> Stretch {
     let length = high.value - low.value;
-    let reciprocal = if length > 0.0 { (1.0 / length) as f32 } else { 0.0 };
+    let start = values.number(low.value) as f32;
+    let reciprocal = if length > 0.0 { (values.unit() / length) as f32 } else { 0.0 };
     let reciprocal = if reciprocal.is_finite() { reciprocal } else { 0.0 };
     Stretch { start, reciprocal, low: rgb_extinction(low), high: rgb_extinction(high) }
 }
@@ -148,6 +149,7 @@ fn rgb_extinction(k: &Knot) -> [f32; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use brickfield_frame::Decode;
     use proptest::prelude::*;
 
     proptest! {
@@ -165,8 +167,9 @@ mod tests {
             }
             let knot = |(i, v): (usize, &f64)| Knot { value: *v, extinction: (i * 7 % 5) as f64, color: [0.1 * (i % 10) as f64, 0.5, 1.0] };
             let tf = TransferFunction::new(values.iter().enumerate().map(knot).collect()).unwrap();
-            let classifier = Classifier::new(&tf);
-            let (got, expected) = (classifier.at((at - classifier.origin) as f32), tf.at(at));
+            let scale = ValueScale::of(&tf, Decode { scale: 100.0, offset: 0.0 });
+            let classifier = Classifier::new(&tf, scale);
+            let (got, expected) = (classifier.at(scale.number(at) as f32), tf.at(at));
             let slope = values.windows(2).map(|v| v[1] - v[0]).filter(|d| *d > 0.0).fold(1.0, f64::min);
             prop_assert!((f64::from(got.extinction) - expected.extinction).abs() < 1e-4 / slope);
             prop_assert!((f64::from(got.color[0]) - expected.color[0]).abs() < 1e-4 / slope);

@@ -181,7 +181,8 @@ fn evaluate<const N: usize, S: Stored>(
     [x, y, z, _]: [f32; 4],
 ) -> [f32; 4] {
     let transfer = &scene.transfer;
-    let relative = |v: f32| (f64::from(v) - transfer.origin) as f32;
+    let values = transfer.values;
+    let relative = |v: f32| values.number(v.into()) as f32;
     match function {
         ShaderFunction::Alpha => [scalar::alpha(x), 0.0, 0.0, 0.0],
         ShaderFunction::Depth => [scalar::depth(x), 0.0, 0.0, 0.0],
@@ -196,7 +197,7 @@ fn evaluate<const N: usize, S: Stored>(
         }
         ShaderFunction::Sample => {
             let value = scene.value(DVec3::new(x.into(), y.into(), z.into()));
-            value.map_or([0.0; 4], |v| [(f64::from(v) + transfer.origin) as f32, 1.0, 0.0, 0.0])
+            value.map_or([0.0; 4], |v| [values.value(v.into()) as f32, 1.0, 0.0, 0.0])
         }
         ShaderFunction::RayAnchor => {
             let ray = scene.plan.rays.ray(x as u32, y as u32);

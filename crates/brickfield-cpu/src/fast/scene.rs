@@ -13,7 +13,7 @@ pub(super) struct Scene<'a, const N: usize, S> {
     /// Adds up to a position in sample space from one relative to the frame's centre.
     pub(super) center: DVec3,
     pub(super) last: DVec3,
-    /// From a stored number, less the bias, to a value relative to the first knot.
+    /// From a stored number, less the bias, to a number of the value scale.
     pub(super) gain: f32,
     pub(super) offset: f32,
     /// The stored number nearest to the first knot; 0 but for 16-bit ones.
@@ -34,11 +34,10 @@ pub(super) struct Block {
 
 impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
     pub(super) fn new(plan: &'a FramePlan) -> Self {
-        let transfer = Classifier::new(&plan.transfer);
-        let decode = plan.bricks.decode();
-        let gain = decode.scale / S::FORMAT.unit();
+        let (decode, values) = (plan.bricks.decode(), plan.value_scale());
+        let gain = decode.scale / values.unit() / S::FORMAT.unit();
         let bias = match S::FORMAT {
-            SampleFormat::Unorm16 => plan.bricks.nearest_stored(transfer.origin),
+            SampleFormat::Unorm16 => plan.bricks.nearest_stored(values.origin()),
             SampleFormat::Unorm8 | SampleFormat::Float32 => 0.0,
         };
         Scene {
@@ -46,9 +45,9 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
             center: plan.rays.center,
             last: plan.last_sample(),
             gain: gain as f32,
-            offset: (bias * gain + decode.offset - transfer.origin) as f32,
+            offset: (bias * gain + values.number(decode.offset)) as f32,
             bias: bias as f32,
-            transfer,
+            transfer: Classifier::new(&plan.transfer, values),
             stored: std::marker::PhantomData,
         }
     }
@@ -76,7 +75,7 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
         }
     }
 
-    /// The value at a sample position, relative to the first knot; `None` where its block is transparent.
+    /// The value at a sample position, as a number of the value scale; `None` where its block is transparent.
     pub(super) fn value(&self, q: DVec3) -> Option<f32> {
         let block = self.block(q);
         let IndexEntry::Resident { slot, level } = block.entry else { return None };
@@ -86,7 +85,7 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
         Some(self.values(&nodes, self.brick(slot), &[0.0])[0])
     }
 
-    /// The values at nodes `at`, relative to the first knot.
+    /// The values at nodes `at`, as numbers of the value scale.
     #[inline(always)]
     pub(super) fn values<const L: usize>(&self, nodes: &Nodes, brick: &[u8], at: &[f32; L]) -> [f32; L] {
         let mut values = nodes.stored::<N, S, L>(brick, at);

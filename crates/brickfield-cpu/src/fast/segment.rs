@@ -44,7 +44,7 @@ impl Ray32 {
     }
 }
 
-/// A segment with the given values at its nodes (`None`: extinction 0), relative to the first knot.
+/// A segment with the given values at its nodes (`None`: extinction 0), as numbers of the value scale.
 #[inline(always)]
 pub(super) fn segment(rule: QuadratureRule, transfer: &Classifier, values: [Option<f32>; 2], length: f32) -> Segment32 {
     match (rule, values) {

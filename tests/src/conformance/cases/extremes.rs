@@ -64,9 +64,9 @@ fn voxels() -> Vec<Case> {
         };
         Volume::new(grid(), (0..honest.voxels().len()).map(value).collect::<Vec<f32>>()).expect("as many voxels")
     };
-    let huge = || {
+    let times = |unit: f64| {
         let honest = hills(&grid(), ScalarType::F64);
-        let values = (0..honest.voxels().len()).map(|i| 1e30 * (honest.voxels().at(i) - 0.5));
+        let values = (0..honest.voxels().len()).map(|i| unit * (honest.voxels().at(i) - 0.5));
         Volume::new(grid(), values.collect::<Vec<f64>>()).expect("as many voxels")
     };
     let tiny = || {
@@ -98,7 +98,21 @@ fn voxels() -> Vec<Case> {
             Setup::new(volume, over(-3.0, 3.0)).step(0.25)
         }),
         picture("extreme/values-1e30", catches![RedBlueSwapped, ExtinctionScaled], move || {
-            Setup::new(huge(), over(-3e29, 4e29))
+            Setup::new(times(1e30), over(-3e29, 4e29))
+        }),
+        picture("extreme/values-1e300", catches![BricksShifted, KnotMoved, shader::NEAREST], move || {
+            Setup::new(times(1e300), over(-3e299, 4e299))
+        }),
+        picture("extreme/values-1e-299", catches![BricksShifted, KnotMoved, shader::NEAREST], move || {
+            Setup::new(times(1e-299), over(-3e-300, 4e-300))
+        }),
+        // The values' range is all that is visible, and 100 orders of magnitude from the last knot.
+        picture("extreme/knots-far-apart", catches![RedBlueSwapped, ExtinctionScaled], move || {
+            let knots = [knot(-1e100, 0.1, WARM), knot(1e100, 0.2, COOL)];
+            Setup::new(times(1.0), TransferFunction::new(knots.into()).expect("knots ascend"))
+        }),
+        picture("extreme/denormals-told-apart", catches![BricksShifted, KnotMoved, shader::NEAREST], move || {
+            Setup::new(tiny(), over(2e-43, 7e-43))
         }),
         picture("extreme/denormals", catches![RedBlueSwapped, ExtinctionScaled], move || {
             Setup::new(tiny(), over(-1.0, 1.0))
