@@ -19,7 +19,7 @@ pub enum ConnectError {
         "no Vulkan 1.1 device: install a graphics driver, or mesa-vulkan-drivers (Debian, Ubuntu) for one in software"
     )]
     NoDevice,
-    #[error("no Vulkan adapter {wanted}; there are {there}")]
+    #[error("no Vulkan adapter {wanted}; the adapters are {there}")]
     UnknownAdapter { wanted: String, there: String },
     #[error("{adapter} has no queue that computes")]
     NoComputeQueue { adapter: String },

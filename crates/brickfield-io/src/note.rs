@@ -36,6 +36,8 @@ pub enum Note {
     DuplicateSlices { n_slices: usize },
     /// Files of a folder that are not slices.
     FilesSkipped { n_files: usize, first: String, reason: String },
+    /// Chunks of an OME-Zarr that are not stored; their voxels have the array's fill value.
+    MissingChunks { n_missing: u64, n_chunks: u64 },
     /// Pages of a TIFF that are reduced copies of others.
     PagesSkipped { n_pages: usize },
     /// The file was read as raw voxels, but begins as files of a known format do.
@@ -89,6 +91,9 @@ impl fmt::Display for Note {
                 let files = counted(n_files, "file is no slice", "files are no slices");
                 let which = if *n_files == 1 { "" } else { "first " };
                 write!(f, "{files} and {} skipped, {which}{first:?}: {reason}", were(*n_files))
+            }
+            Note::MissingChunks { n_missing, n_chunks } => {
+                write!(f, "{n_missing} of {n_chunks} chunks are not stored; their voxels have the fill value")
             }
             Note::PagesSkipped { n_pages } => {
                 let pages = counted(n_pages, "page", "pages");

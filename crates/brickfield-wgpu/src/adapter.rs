@@ -39,7 +39,7 @@ pub enum OpenError {
          install your GPU's driver, or a software one (Debian: mesa-vulkan-drivers)"
     )]
     NoAdapter,
-    #[error("no adapter {choice}; there is {}", list(available))]
+    #[error("no adapter {choice}; the adapters are {}", list(available))]
     NoSuchAdapter { choice: AdapterChoice, available: Vec<AdapterSummary> },
     #[error("adapter {adapter} gave no device: {message}")]
     NoDevice { adapter: String, message: String },
@@ -156,7 +156,10 @@ mod tests {
     fn errors_say_what_there_is() {
         let available = vec![summary(0, "llvmpipe", "software")];
         let error = OpenError::NoSuchAdapter { choice: AdapterChoice::Name("x".into()), available };
-        assert_eq!(error.to_string(), "no adapter with `x` in its name; there is 0: llvmpipe (software, driver 1)");
+        assert_eq!(
+            error.to_string(),
+            "no adapter with `x` in its name; the adapters are 0: llvmpipe (software, driver 1)"
+        );
         assert!(OpenError::NoAdapter.to_string().contains("mesa-vulkan-drivers"));
     }
 }

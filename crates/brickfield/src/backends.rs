@@ -126,7 +126,7 @@ fn open_cpu(adapter: Option<&str>) -> Result<Box<dyn Backend>, BackendError> {
     let name = &backend.describe().adapter;
     match adapter {
         Some(wanted) if wanted != "0" && !name.contains(wanted) => {
-            let reason = format!("no adapter {wanted:?}; there is 0: {name}");
+            let reason = format!("no adapter {wanted:?}; the only one is 0: {name}");
             Err(BackendError::Unavailable { kind: BackendKind::Cpu, reason })
         }
         _ => Ok(Box::new(backend)),

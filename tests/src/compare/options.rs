@@ -90,7 +90,13 @@ pub fn parse(arguments: Vec<OsString>) -> Result<CompareArgs, clap::Error> {
     let mut matches = CompareArgs::command().mut_arg("size", size).try_get_matches_from(arguments)?;
     let default_camera = matches.value_source("camera") == Some(ValueSource::DefaultValue);
     let args = CompareArgs::from_arg_matches_mut(&mut matches)?;
-    Ok(CompareArgs { default_camera, command, ..args })
+    let (rules, modes) = (each_once(&args.rules), each_once(&args.modes));
+    Ok(CompareArgs { rules, modes, default_camera, command, ..args })
+}
+
+fn each_once<T: Copy + PartialEq>(list: &[T]) -> Vec<T> {
+    let is_first = |(i, x): &(usize, &T)| !list[..*i].contains(x);
+    list.iter().enumerate().filter(is_first).map(|(_, x)| *x).collect()
 }
 
 fn quoted(word: &str) -> String {
@@ -121,8 +127,9 @@ mod tests {
 
     #[test]
     fn lists_and_fractions() {
-        let a = args("x.vti --steps 1,0.5,1/8 --rules gauss2 --modes fast --backends ash,cpu --size 64x32").unwrap();
-        assert_eq!(a.steps, [1.0, 0.5, 0.125]);
+        let a =
+            args("x.vti --steps 1,0.5,1/8 --rules gauss2,gauss2 --modes fast --backends ash,cpu --size 64x32").unwrap();
+        assert_eq!((a.steps.as_slice(), a.rules.len()), (&[1.0, 0.5, 0.125][..], 1));
         assert_eq!((a.rules[0], a.backends[1], a.view.size.y), (QuadratureRule::Gauss2, BackendKind::Cpu, 32));
         assert!(a.command.starts_with("cargo xtask compare x.vti --steps 1,0.5,1/8"));
         assert_eq!(quoted("it's front"), r"'it'\''s front'");

@@ -6,23 +6,24 @@ use zarrs::storage::{ReadableStorage, ReadableStorageTraits};
 
 use super::image::VolumeAxes;
 use super::metadata::ArrayMetadata;
-use crate::ReadError;
 use crate::error::bytes;
 use crate::limits::Shape;
 use crate::samples::Sample;
+use crate::{Note, ReadError};
 
-/// Reads all chunks that hold the first entry of every other axis.
+/// Reads all chunks that hold the first entry of every other axis; notes that some are not stored.
 pub(super) fn read(
     store: &ReadableStorage,
     path: &str,
     metadata: &ArrayMetadata,
     volume_axes: VolumeAxes,
     shape: &Shape,
-) -> Result<Voxels, ReadError> {
+) -> Result<(Voxels, Option<Note>), ReadError> {
     let array = Array::new_with_metadata(store.clone(), path, metadata.for_zarrs()?);
     let array = array.map_err(|e| ReadError::decoder("the array", e))?;
-    let reader = Reader { array, metadata, volume_axes, dims: shape.dims.to_array().map(u64::from) };
-    match metadata.scalar {
+    let dims = shape.dims.to_array().map(u64::from);
+    let mut reader = Reader { array, metadata, volume_axes, dims, n_chunks: 0, n_missing: 0 };
+    let voxels = match metadata.scalar {
         ScalarType::U8 => reader.read::<u8>(),
         ScalarType::I8 => reader.read::<i8>(),
         ScalarType::U16 => reader.read::<u16>(),
@@ -31,7 +32,9 @@ pub(super) fn read(
         ScalarType::I32 => reader.read::<i32>(),
         ScalarType::F32 => reader.read::<f32>(),
         ScalarType::F64 => reader.read::<f64>(),
-    }
+    }?;
+    let Reader { n_chunks, n_missing, .. } = reader;
+    Ok((voxels, (n_missing > 0).then_some(Note::MissingChunks { n_missing, n_chunks })))
 }
 
 struct Reader<'a> {
@@ -39,10 +42,13 @@ struct Reader<'a> {
     metadata: &'a ArrayMetadata,
     volume_axes: VolumeAxes,
     dims: [u64; 3],
+    n_chunks: u64,
+    /// Those that are not stored, and have the fill value.
+    n_missing: u64,
 }
 
 impl Reader<'_> {
-    fn read<T: Sample + ElementOwned>(&self) -> Result<Voxels, ReadError> {
+    fn read<T: Sample + ElementOwned>(&mut self) -> Result<Voxels, ReadError> {
         let fill = self.fill_value::<T>()?;
         let n = self.dims.iter().product::<u64>() as usize;
         let mut values = Vec::<T>::new();
@@ -54,7 +60,9 @@ impl Reader<'_> {
         for z in 0..n_chunks[2] {
             for y in 0..n_chunks[1] {
                 for x in 0..n_chunks[0] {
-                    self.read_chunk([x, y, z], chunk, &mut values)?;
+                    let is_stored = self.read_chunk([x, y, z], chunk, &mut values)?;
+                    self.n_chunks += 1;
+                    self.n_missing += u64::from(!is_stored);
                 }
             }
         }
@@ -74,12 +82,13 @@ impl Reader<'_> {
         self.volume_axes.map(|axis| axis.map_or(1, |a| sizes[a]))
     }
 
+    /// Whether the chunk is stored.
     fn read_chunk<T: Sample + ElementOwned>(
         &self,
         at: [u64; 3],
         chunk: [u64; 3],
         values: &mut [T],
-    ) -> Result<(), ReadError> {
+    ) -> Result<bool, ReadError> {
         let mut indices = vec![0; self.metadata.shape.len()];
         for (axis, i) in self.volume_axes.iter().zip(at) {
             if let Some(axis) = axis {
@@ -88,7 +97,7 @@ impl Reader<'_> {
         }
         let what = format!("chunk {indices:?}");
         let stored = self.array.retrieve_encoded_chunk(&indices).map_err(|e| ReadError::decoder(&what, e))?;
-        let Some(stored) = stored else { return Ok(()) };
+        let Some(stored) = stored else { return Ok(false) };
         let named = format!("{what} of {} stored", bytes(stored.len()));
         let (chunk_shape, sample_bytes) = (&self.metadata.chunk_shape, size_of::<T>() as u64);
         self.metadata.packing.check(&stored, chunk_shape, sample_bytes, &what)?;
@@ -99,7 +108,7 @@ impl Reader<'_> {
             return Err(ReadError::TooFewSamples { what, found: samples.len(), expected: n_expected });
         }
         self.place(&samples, [0, 1, 2].map(|i| at[i] * chunk[i]), chunk, values);
-        Ok(())
+        Ok(true)
     }
 
     /// Copies the part of a chunk that lies in the volume; `start` is its first voxel.

@@ -57,7 +57,8 @@ fn read_store(store: ReadableStorage, limits: &Limits) -> Result<Opened, ReadErr
     let shape = Shape::claim(dims, array.scalar, limits)?;
     let grid = image.placement(volume_axes).grid(shape.dims)?;
     array.check_chunks(limits)?;
-    let voxels = guarded("Zarr", || chunks::read(&store, &image.path, &array, volume_axes, &shape))?;
+    let (voxels, note) = guarded("Zarr", || chunks::read(&store, &image.path, &array, volume_axes, &shape))?;
+    found.notes.extend(note);
     found.unit = image.unit(volume_axes);
     found.finish(grid, voxels)
 }

@@ -117,6 +117,7 @@ fn chunks_at_the_edge_reach_beyond_it_and_missing_ones_are_filled() {
     let opened = read(&v3("uint8", "[2,3,4]", "[1,2,3]", &format!("[{LITTLE}]"), &chunks)).unwrap();
     let expected: Vec<u8> = ramp.iter().enumerate().map(|(i, v)| if i % 4 == 3 { 7 } else { *v }).collect();
     assert_eq!(opened.volume.voxels(), &Voxels::U8(expected));
+    assert_eq!(opened.notes, [Note::MissingChunks { n_missing: 4, n_chunks: 8 }]);
 }
 
 #[test]
