@@ -4,6 +4,7 @@ use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Grid, Scalar, Volume, Voxels, with_voxels};
 
 use crate::limits::Shape;
+use crate::samples::with_room;
 use crate::{Limits, Note, Opened};
 
 /// Most even slices for each uneven one: stacks with wider gaps stay as they are.
@@ -65,8 +66,7 @@ fn even_grid(grid: &Grid, dims: UVec3, step: f64) -> Option<Grid> {
 
 /// Slices at multiples of `step`, mixed from those at `positions`; `None` if there is no memory for them.
 fn even<T: Scalar>(voxels: &[T], shape: &Shape, positions: &[f64], step: f64) -> Option<Voxels> {
-    let mut out = Vec::new();
-    out.try_reserve_exact(shape.n_voxels()).ok()?;
+    let mut out = with_room(shape.n_voxels()).ok()?;
     let n_slice = voxels.len() / positions.len();
     let slice = |i: usize| &voxels[i * n_slice..][..n_slice];
     for at in (0..shape.dims.z).map(|k| f64::from(k) * step) {

@@ -46,6 +46,7 @@ impl Found {
         Found { format, frame: WorldFrame::Plain, unit: None, notes: Vec::new() }
     }
 
+    #[cfg(any(feature = "ome-zarr", feature = "tiff"))]
     pub(crate) fn pictures(format: Format) -> Found {
         Found { frame: WorldFrame::Pictures, ..Found::plain(format) }
     }

@@ -9,6 +9,8 @@ use crate::Note;
 use crate::ReadError;
 #[cfg(feature = "nifti")]
 use crate::limits::{Limits, check_bytes};
+#[cfg(feature = "nifti")]
+use crate::samples::with_room;
 
 /// value = slope * stored + intercept.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,9 +64,7 @@ pub(crate) fn rescaled(voxels: Voxels, rescale: Rescale, limits: &Limits) -> Res
 /// Voxels as `T`, rescaled; a value outside `T` saturates.
 #[cfg(feature = "nifti")]
 fn mapped<T: Scalar>(voxels: &Voxels, rescale: Rescale) -> Result<Voxels, ReadError> {
-    let mut values = Vec::<T>::new();
-    let n_bytes = voxels.len() as u128 * size_of::<T>() as u128;
-    values.try_reserve_exact(voxels.len()).map_err(|_| ReadError::OutOfMemory { n_bytes })?;
+    let mut values = with_room::<T>(voxels.len())?;
     with_voxels!(voxels, v => values.extend(v.iter().map(|x| T::from_f64(rescale.apply(x.to_f64())))));
     Ok(T::wrap(values))
 }

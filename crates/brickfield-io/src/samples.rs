@@ -38,16 +38,24 @@ macro_rules! sample {
 }
 sample! { u8 i8 u16 i16 u32 i32 f32 f64 }
 
+/// No samples, with room for `n`.
+///
+/// # Errors
+/// If there is no memory for them.
+pub(crate) fn with_room<T>(n: usize) -> Result<Vec<T>, ReadError> {
+    let mut values = Vec::new();
+    let n_bytes = n as u128 * size_of::<T>() as u128;
+    values.try_reserve_exact(n).map_err(|_| ReadError::OutOfMemory { n_bytes })?;
+    Ok(values)
+}
+
 /// Empty voxels with room for the whole shape.
 ///
 /// # Errors
 /// If there is no memory for them.
 pub(crate) fn allocate(shape: &Shape) -> Result<Voxels, ReadError> {
     fn reserve<T: Scalar>(n: usize) -> Result<Voxels, ReadError> {
-        let mut values = Vec::<T>::new();
-        let n_bytes = n as u128 * size_of::<T>() as u128;
-        values.try_reserve_exact(n).map_err(|_| ReadError::OutOfMemory { n_bytes })?;
-        Ok(T::wrap(values))
+        with_room(n).map(T::wrap)
     }
     let n = shape.n_voxels();
     match shape.scalar {

@@ -11,7 +11,7 @@ use crate::files::{DataFiles, open_named};
 use crate::guard::guarded;
 use crate::limits::{Limits, Shape, check_bytes};
 use crate::rescale::{Rescale, rescaled_type};
-use crate::samples::{allocate, append_binary};
+use crate::samples::{allocate, append_binary, with_room};
 use crate::stored::check_length;
 use crate::{ByteOrder, Note, ReadError};
 
@@ -164,9 +164,7 @@ fn fits(range: ValueRange, scalar: ScalarType) -> bool {
 }
 
 fn apply<T: Scalar>(stored: &Voxels, rescales: &[Rescale], n_per_slice: usize) -> Result<Voxels, ReadError> {
-    let mut values = Vec::<T>::new();
-    let n_bytes = stored.len() as u128 * size_of::<T>() as u128;
-    values.try_reserve_exact(stored.len()).map_err(|_| ReadError::OutOfMemory { n_bytes })?;
+    let mut values = with_room::<T>(stored.len())?;
     with_voxels!(stored, v => {
         for (slice, rescale) in v.chunks(n_per_slice).zip(rescales) {
             values.extend(slice.iter().map(|x| T::from_f64(rescale.apply(x.to_f64()))));

@@ -8,7 +8,7 @@ use super::image::VolumeAxes;
 use super::metadata::ArrayMetadata;
 use crate::error::bytes;
 use crate::limits::Shape;
-use crate::samples::Sample;
+use crate::samples::{Sample, with_room};
 use crate::{Note, ReadError};
 
 /// Reads all chunks that hold the first entry of every other axis; notes that some are not stored.
@@ -51,9 +51,7 @@ impl Reader<'_> {
     fn read<T: Sample + ElementOwned>(&mut self) -> Result<Voxels, ReadError> {
         let fill = self.fill_value::<T>()?;
         let n = self.dims.iter().product::<u64>() as usize;
-        let mut values = Vec::<T>::new();
-        let n_bytes = n as u128 * size_of::<T>() as u128;
-        values.try_reserve_exact(n).map_err(|_| ReadError::OutOfMemory { n_bytes })?;
+        let mut values = with_room::<T>(n)?;
         values.resize(n, fill);
         let chunk = self.along_volume(&self.metadata.chunk_shape);
         let n_chunks = [0, 1, 2].map(|i| self.dims[i].div_ceil(chunk[i]));

@@ -256,14 +256,7 @@ fn stack() -> Vec<u8> {
         let start = samples + 4 * i as u16;
         let tags: [(u16, u16); 8] =
             [(256, 2), (257, 1), (258, 16), (259, 1), (262, 1), (273, start), (277, 1), (279, 4)];
-        out.extend((tags.len() as u16).to_be_bytes());
-        for (tag, value) in tags {
-            out.extend(tag.to_be_bytes());
-            out.extend([0, 3, 0, 0, 0, 1]);
-            out.extend(value.to_be_bytes());
-            out.extend([0, 0]);
-        }
-        out.extend(next.to_be_bytes());
+        out.extend(crate::tiff::directory(&tags, next));
     }
     out.extend([1, 2, 3, 4, 5, 6, 7, 8]);
     out

@@ -71,14 +71,20 @@ fn big_endian(samples: [u8; 4]) -> Vec<u8> {
     let mut out = b"MM\0\x2a\0\0\0\x0c".to_vec();
     out.extend(samples);
     let tags: [(u16, u16); 8] = [(256, 2), (257, 1), (258, 16), (259, 1), (262, 1), (273, 8), (277, 1), (279, 4)];
-    out.extend((tags.len() as u16).to_be_bytes());
+    out.extend(directory(&tags, 0));
+    out
+}
+
+/// A big-endian directory of tags with one 16-bit value each; `next` is where the following one lies, 0 if there is none.
+pub(crate) fn directory(tags: &[(u16, u16)], next: u32) -> Vec<u8> {
+    let mut out = (tags.len() as u16).to_be_bytes().to_vec();
     for (tag, value) in tags {
         out.extend(tag.to_be_bytes());
         out.extend([0, 3, 0, 0, 0, 1]);
         out.extend(value.to_be_bytes());
         out.extend([0, 0]);
     }
-    out.extend([0; 4]);
+    out.extend(next.to_be_bytes());
     out
 }
 

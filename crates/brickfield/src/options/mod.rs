@@ -65,11 +65,15 @@ pub struct ViewOptions {
 }
 
 fn transfer_help() -> String {
-    let presets = Preset::ALL.map(|p| p.name()).join(", ");
     format!(
-        "Transfer function: auto (from the histogram), a preset ({presets}), or a JSON or TOML file of knots: \
-         {{\"knots\": [{{\"value\": 100, \"extinction\": 0, \"srgb\": \"#ffffff\"}}, ...]}}"
+        "Transfer function: auto (from the histogram), a preset ({}), or a JSON or TOML file of knots: \
+         {{\"knots\": [{{\"value\": 100, \"extinction\": 0, \"srgb\": \"#ffffff\"}}, ...]}}",
+        presets()
     )
+}
+
+fn presets() -> String {
+    Preset::ALL.map(|p| p.name()).join(", ")
 }
 
 /// A linear background colour.
@@ -209,8 +213,7 @@ impl ViewOptions {
         if path.exists() {
             return Ok(brickfield_optics::read_transfer(&path)?);
         }
-        let presets = Preset::ALL.map(|p| p.name()).join(", ");
-        Err(OptionError::NoSuchTransfer { name: self.transfer.clone(), presets })
+        Err(OptionError::NoSuchTransfer { name: self.transfer.clone(), presets: presets() })
     }
 
     /// The scene of a volume, sampled as by default; what of the options the volume does not have is printed.

@@ -15,8 +15,8 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     of_volume(&mut text, &opened)?;
     let notes = opened.notes.clone();
     let even = opened.evenly_spaced(&args.input.limits());
-    let made = even.notes.iter().filter(|note| !notes.contains(note));
-    made.into_iter().try_for_each(|note| writeln!(text, "rendering   {note}"))?;
+    let mut made = even.notes.iter().filter(|note| !notes.contains(note));
+    made.try_for_each(|note| writeln!(text, "rendering   {note}"))?;
     of_tree(&mut text, &args.tree.build(&even.volume)?)?;
     print(&text)
 }
