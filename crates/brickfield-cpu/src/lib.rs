@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod blocks;
 pub mod closed_form;
 mod continuous;
 mod discrete;

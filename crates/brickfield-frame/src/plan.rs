@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, TransferFunction};
-use brickfield_optics::QuadratureRule;
 
-use crate::{Beams, BrickSet, Feature, FeatureSet, IndexGrid, Occupancy, RayFrame, SampleFormat, ValueScale};
+use crate::{Beams, BrickSet, Feature, FeatureSet, IndexGrid, Occupancy, RayFrame, SampleFormat, Sampling, ValueScale};
 
 /// Everything that a backend needs for one frame, and nothing that this frame does not need.
 #[derive(Clone, Debug)]
@@ -55,92 +54,5 @@ impl FramePlan {
     /// Width and height of the picture, in pixels.
     pub fn size(&self) -> UVec2 {
         self.rays.size
-    }
-}
-
-/// How a ray is sampled.
-///
-/// Segment k is [k h, (k + 1) h) from the eye for every ray (LaMar et al. 1999: spherical shells), cut to the domain; the
-/// rule's nodes lie in the cut segment. A node belongs to the brick that holds it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sampling {
-    step_world: f64,
-    rule: QuadratureRule,
-    mode: Mode,
-}
-
-/// Exact or fast; never mixed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Mode {
-    /// Eight loads and f32 arithmetic per sample, no early termination.
-    Exact,
-    /// Hardware filtering; a ray ends when its transmittance falls below `transmittance_floor` (0: never), which is the
-    /// most that any channel can lose.
-    #[allow(missing_docs)]
-    Fast { transmittance_floor: f64 },
-}
-
-impl Mode {
-    /// The fast mode that the front door chooses: rays end at a transmittance of 1/1024, a quarter of an 8-bit step.
-    pub const FAST: Mode = Mode::Fast { transmittance_floor: 1.0 / 1024.0 };
-
-    /// `exact` or `fast`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Mode::Exact => "exact",
-            Mode::Fast { .. } => "fast",
-        }
-    }
-}
-
-/// Why a sampling is refused.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-#[allow(missing_docs)]
-pub enum SamplingError {
-    #[error("a step of {step_world} world units; it must be finite and above 0")]
-    Step { step_world: f64 },
-    #[error("a transmittance floor of {floor}; it must be at least 0 and below 1")]
-    TransmittanceFloor { floor: f64 },
-}
-
-impl Sampling {
-    /// A sampling.
-    ///
-    /// # Errors
-    /// A step that is not finite and positive, a transmittance floor outside [0, 1).
-    pub fn new(step_world: f64, rule: QuadratureRule, mode: Mode) -> Result<Sampling, SamplingError> {
-        if !(step_world.is_finite() && step_world > 0.0) {
-            return Err(SamplingError::Step { step_world });
-        }
-        match mode {
-            Mode::Fast { transmittance_floor: floor } if !(0.0..1.0).contains(&floor) => {
-                Err(SamplingError::TransmittanceFloor { floor })
-            }
-            _ => Ok(Sampling { step_world, rule, mode }),
-        }
-    }
-
-    /// Length of a segment, in world units.
-    pub fn step_world(&self) -> f64 {
-        self.step_world
-    }
-
-    /// How a segment is integrated.
-    pub fn rule(&self) -> QuadratureRule {
-        self.rule
-    }
-
-    /// Exact or fast.
-    pub fn mode(&self) -> Mode {
-        self.mode
-    }
-
-    /// The transmittance at which rays end; 0 if they never do.
-    pub fn transmittance_floor(&self) -> f64 {
-        match self.mode {
-            Mode::Exact => 0.0,
-            Mode::Fast { transmittance_floor } => transmittance_floor,
-        }
     }
 }

@@ -1,14 +1,16 @@
 //! The rays of a frame in sample space, in a form that keeps its digits in f32.
 
 use brickfield_core::glam::{DVec2, DVec3, UVec2};
-use brickfield_core::{Aabb, Camera, Grid, IndexPos, Projection, SamplePos, WorldPos};
+use brickfield_core::{Aabb, Camera, Grid, IndexPos, Level, Projection, SamplePos, WorldPos};
+
+use crate::{Division, Placement, Sampling};
 
 /// The rays of a frame in sample space.
 ///
-/// A ray is q(t) = center + anchor + direction (t - t_anchor), t in world units past the frame's `start`. Its anchor is
-/// where it meets the plane through the volume's centre; all of it is affine in the picture position but for the length
-/// that normalises the direction. So no term is larger than the volume, wherever the eye and the origin are, and f32
-/// holds a position to about 1e-7 of the volume's size.
+/// A ray is q(t) = center + anchor + direction (t - t_anchor), t in world units past its surface 0 ([`Placement`]); surface k is
+/// at t = k steps times the ray's stretch. Its anchor is where it meets the plane through the volume's centre; all of it is
+/// affine in the picture position but for the length that normalises the direction. So no term is larger than the volume,
+/// wherever the eye and the origin are, and f32 holds a position to about 1e-7 of the volume's size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayFrame {
     /// Width and height of the picture, in pixels.
@@ -25,10 +27,44 @@ pub struct RayFrame {
     pub anchor_past_start: f64,
     /// Distance from the eye to the plane of the anchors, along the view direction; 0 for parallel rays.
     pub anchor_depth: f64,
-    /// Where the frame's parameter begins: this many world units from the eye, a whole number of steps.
+    /// Where surface 0 lies: this many world units from the eye along the surfaces' normals, a whole number of steps (of the
+    /// coarsest level's steps). Object-aligned planes start at the volume instead.
     pub start: f64,
     /// Segments from the start to the farthest point of the volume, rounded up.
     pub n_segments: f64,
+    /// The surfaces between segments.
+    pub placement: Placement,
+    /// The planes of [`Placement::ObjectPlanes`].
+    pub planes: PlaneStacks,
+}
+
+/// Where a plane of every stack lies, in sample space. From here no middle between planes of whole or half voxels, at any
+/// level, lies on a brick's face, where rounding would decide which brick has it.
+const FIRST_PLANE: DVec3 = DVec3::splat(-1.0 / 6.0);
+/// What the cosines to x, y and z are multiplied by before they are compared.
+pub(crate) const PREFERENCE: DVec3 = DVec3::new(1.0, 1.0 - 1.0 / 4096.0, 1.0 - 2.0 / 4096.0);
+
+/// What makes the surfaces of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Steps {
+    /// Distance between surfaces, in world units.
+    pub step_world: f64,
+    /// The surfaces.
+    pub placement: Placement,
+    /// The coarsest level whose steps must fall on surfaces: surface 0 is one of its own.
+    pub coarsest: Level,
+}
+
+/// Three stacks of planes, a step apart in the world: of constant x, y, z in sample space.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PlaneStacks {
+    /// Distance between two planes a voxel apart, in world units: what a direction in voxels per world unit is multiplied by
+    /// to give the cosines of its angles to the planes' normals.
+    pub voxel_world: DVec3,
+    /// The first planes that rays towards greater x, y, z meet; relative to the frame's centre.
+    pub low: DVec3,
+    /// The first planes that rays towards smaller x, y, z meet; relative to the frame's centre.
+    pub high: DVec3,
 }
 
 /// One ray of a [`RayFrame`].
@@ -38,15 +74,40 @@ pub struct PlanRay {
     pub anchor: DVec3,
     /// Change of the sample position per world unit.
     pub direction: DVec3,
-    /// Parameter of the anchor, in world units past the frame's start.
+    /// Parameter of the anchor, in world units past the ray's surface 0.
     pub t_anchor: f64,
+    /// Parameter of the eye (parallel rays: the eye's plane): rays begin here.
+    pub t_eye: f64,
+    /// Distance between two surfaces along the ray, in steps: at least 1 but for tessellated shells, whose facets lie inside.
+    pub stretch: f64,
+}
+
+impl Steps {
+    /// Spherical shells.
+    pub fn shells(step_world: f64) -> Steps {
+        Steps { step_world, placement: Placement::Shells, coarsest: Level(0) }
+    }
+
+    /// The surfaces of a sampling of bricks up to level `coarsest`.
+    pub fn of(sampling: &Sampling, coarsest: Level) -> Steps {
+        let coarsest = match sampling.division() {
+            Division::Ray => Level(0),
+            Division::Brick => coarsest,
+        };
+        Steps { step_world: sampling.step_world(), placement: sampling.placement(), coarsest }
+    }
+
+    /// Distance between the coarsest level's surfaces.
+    fn coarsest_world(&self) -> f64 {
+        self.step_world * f64::from(self.coarsest.stride())
+    }
 }
 
 impl RayFrame {
-    /// The rays of a camera's picture of a grid, with sample phase `step_world`.
+    /// The rays of a camera's picture of a grid, with the surfaces of `steps`.
     ///
     /// `domain` is the part of sample space that is rendered; the frame starts a whole number of steps before it.
-    pub fn new(camera: &Camera, grid: &Grid, size: UVec2, domain: &Aabb, step_world: f64) -> RayFrame {
+    pub fn new(camera: &Camera, grid: &Grid, size: UVec2, domain: &Aabb, steps: &Steps) -> RayFrame {
         let to_sample = |p: DVec3| SamplePos::from(grid.index(WorldPos(p))).0;
         let turn = |v: DVec3| grid.world_to_index().transform_vector3(v);
         let center = domain.center();
@@ -56,19 +117,20 @@ impl RayFrame {
         let (right, down) = (turn(camera.right() * rays.pixel()), turn(camera.up() * -rays.pixel()));
         let anchor0 = to_sample(camera.eye() + camera.forward() * depth) - center;
         let forward = turn(camera.forward());
-        let start = first_step(camera, grid, domain, step_world) * step_world;
         let frame = RayFrame {
             size,
             center,
             anchor: [anchor0, right, down],
             direction: [forward, DVec3::ZERO, DVec3::ZERO],
             pixel: 0.0,
-            anchor_past_start: depth - start,
+            anchor_past_start: depth,
             anchor_depth: 0.0,
-            start,
-            n_segments: ((farthest(camera, grid, domain) - start) / step_world).ceil().max(1.0),
+            start: 0.0,
+            n_segments: 1.0,
+            placement: steps.placement,
+            planes: PlaneStacks::default(),
         };
-        match camera.projection() {
+        let frame = match camera.projection() {
             Projection::Orthographic { .. } => frame,
             Projection::Perspective { .. } => RayFrame {
                 anchor: [anchor0, right * depth, down * depth],
@@ -77,7 +139,36 @@ impl RayFrame {
                 anchor_depth: depth,
                 ..frame
             },
+        };
+        let corners = from_eye(camera, grid, domain);
+        let nearest = corners.iter().map(|c| c.dot(camera.forward())).fold(f64::INFINITY, f64::min);
+        // The surface before the nearest point: no surface is farther from the eye than spheres are.
+        let coarsest = steps.coarsest_world();
+        let start = ((nearest / coarsest).floor() * coarsest).max(0.0);
+        let n_segments = (farthest(camera, &corners) - start) / steps.step_world;
+        let frame = RayFrame { start, anchor_past_start: depth - start, n_segments: n_segments.ceil().max(1.0), ..frame };
+        match steps.placement {
+            Placement::Shells | Placement::ViewportPlanes => frame,
+            Placement::TessellatedShells { .. } => {
+                let centre = frame.facet_normal(frame.facet_of(size.x / 2, size.y / 2)).length();
+                RayFrame { n_segments: (n_segments * centre).ceil().max(1.0), ..frame }
+            }
+            Placement::ObjectPlanes => {
+                let planes = PlaneStacks::new(grid, center, domain, steps);
+                RayFrame { planes, n_segments: planes.most_segments(steps.step_world), ..frame }
+            }
         }
+    }
+
+    /// The ray of pixel (x, y) with the planes that it would take if its angles to them were off by `rounding`, in cosines;
+    /// `None` if it would take the same ones.
+    pub fn ray_across_tie(&self, x: u32, y: u32, rounding: f64) -> Option<PlanRay> {
+        if self.placement != Placement::ObjectPlanes {
+            return None;
+        }
+        let shells = RayFrame { placement: Placement::Shells, ..*self }.ray(x, y);
+        let axis = self.planes.other_axis(shells.direction, rounding)?;
+        Some(self.planes.through(shells, axis))
     }
 
     /// The ray through the centre of pixel (x, y).
@@ -85,44 +176,99 @@ impl RayFrame {
     pub fn ray(&self, x: u32, y: u32) -> PlanRay {
         let at = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) - 0.5 * self.size.as_dvec2();
         let mix = |v: &[DVec3; 3]| v[0] + v[1] * at.x + v[2] * at.y;
-        let square = (at * self.pixel).length_squared();
+        let across = at * self.pixel;
+        let square = across.length_squared();
         let length = (1.0 + square).sqrt();
-        PlanRay {
-            anchor: mix(&self.anchor),
-            direction: mix(&self.direction) / length,
-            // depth * length = depth + depth * square / (1 + length), without cancellation
-            t_anchor: self.anchor_past_start + self.anchor_depth * (square / (1.0 + length)),
+        let (anchor, direction) = (mix(&self.anchor), mix(&self.direction) / length);
+        // depth * length = depth + depth * square / (1 + length), without cancellation
+        let t_anchor = self.anchor_past_start + self.anchor_depth * (square / (1.0 + length));
+        let shells = PlanRay { anchor, direction, t_anchor, t_eye: -self.start, stretch: 1.0 };
+        match self.placement {
+            Placement::Shells => shells,
+            Placement::ViewportPlanes => PlanRay {
+                t_anchor: self.anchor_past_start * length,
+                t_eye: -self.start * length,
+                stretch: length,
+                ..shells
+            },
+            Placement::TessellatedShells { .. } => {
+                let normal = self.facet_normal(self.facet_of(x, y));
+                // How far the facet's plane is beyond the plane at distance 1, where the ray meets that.
+                let beyond = normal.truncate().dot(across) + (normal.z - 1.0);
+                let stretch = length / (1.0 + beyond);
+                let t_anchor = stretch * (self.anchor_past_start + self.anchor_depth * beyond);
+                PlanRay { t_anchor, t_eye: -self.start * stretch, stretch, ..shells }
+            }
+            Placement::ObjectPlanes => self.planes.through(shells, self.planes.axis(direction)),
         }
     }
 }
 
+impl PlaneStacks {
+    fn new(grid: &Grid, center: DVec3, domain: &Aabb, steps: &Steps) -> PlaneStacks {
+        let gradient = grid.world_to_index().matrix3.transpose();
+        let [x, y, z] = [gradient.x_axis, gradient.y_axis, gradient.z_axis].map(DVec3::length);
+        let voxel_world = DVec3::new(x, y, z).recip();
+        let apart = steps.coarsest_world() / voxel_world;
+        PlaneStacks {
+            voxel_world,
+            low: FIRST_PLANE + ((domain.min - FIRST_PLANE) / apart).floor() * apart - center,
+            high: FIRST_PLANE + ((domain.max - FIRST_PLANE) / apart).ceil() * apart - center,
+        }
+    }
+
+    fn most_segments(&self, step_world: f64) -> f64 {
+        ((self.high - self.low) * self.voxel_world / step_world).max_element().ceil().max(1.0)
+    }
+
+    /// The axis whose planes a ray of this direction (voxels per world unit) takes: the steepest. Where two are within
+    /// 1/4096, the first: pictures of boxes seen along a diagonal shall not depend on rounding.
+    #[inline]
+    pub fn axis(&self, direction: DVec3) -> usize {
+        let steep = (direction * self.voxel_world).abs() * PREFERENCE;
+        match steep.x >= steep.y && steep.x >= steep.z {
+            true => 0,
+            false if steep.y >= steep.z => 1,
+            false => 2,
+        }
+    }
+
+    /// The other axis that a ray of this direction would take if cosines were off by `rounding`.
+    fn other_axis(&self, direction: DVec3, rounding: f64) -> Option<usize> {
+        let steep = (direction * self.voxel_world).abs() * PREFERENCE;
+        let own = self.axis(direction);
+        (0..3).find(|axis| *axis != own && steep[*axis] >= steep[own] - rounding)
+    }
+
+    /// The ray with the planes of an axis as its surfaces.
+    fn through(&self, shells: PlanRay, axis: usize) -> PlanRay {
+        let d = shells.direction[axis];
+        let first = if d > 0.0 { self.low[axis] } else { self.high[axis] };
+        let t_anchor = (shells.anchor[axis] - first) / d;
+        let t_eye = t_anchor - (shells.t_anchor - shells.t_eye);
+        PlanRay { t_anchor, t_eye, stretch: 1.0 / (d * self.voxel_world[axis]).abs(), ..shells }
+    }
+}
+
 impl PlanRay {
-    /// The sample position, relative to the frame's centre, at `t` world units past the frame's start.
+    /// The sample position, relative to the frame's centre, at `t` world units past the ray's surface 0.
     #[inline]
     pub fn at(&self, t: f64) -> DVec3 {
         self.anchor + self.direction * (t - self.t_anchor)
     }
 }
-
-/// Distance to the farthest point of the domain's world box, as rays measure it.
-fn farthest(camera: &Camera, grid: &Grid, domain: &Aabb) -> f64 {
-    let distance = |v: DVec3| match camera.projection() {
+/// Distance to the farthest of some points, as rays measure it.
+fn farthest(camera: &Camera, from_eye: &[DVec3]) -> f64 {
+    let distance = |v: &DVec3| match camera.projection() {
         Projection::Orthographic { .. } => v.dot(camera.forward()),
         Projection::Perspective { .. } => v.length(),
     };
-    from_eye(camera, grid, domain).map(distance).into_iter().fold(0.0, f64::max)
+    from_eye.iter().map(distance).fold(0.0, f64::max)
 }
 
 /// From the eye to the corners of the domain's world box.
 fn from_eye(camera: &Camera, grid: &Grid, domain: &Aabb) -> [DVec3; 8] {
     domain.corners().map(|p| grid.world(IndexPos::from(SamplePos(p))).0 - camera.eye())
-}
-
-/// Number of whole steps between the eye and the nearest point of the domain's world box; at least 0.
-fn first_step(camera: &Camera, grid: &Grid, domain: &Aabb, step_world: f64) -> f64 {
-    let nearest_plane =
-        from_eye(camera, grid, domain).iter().map(|c| c.dot(camera.forward())).fold(f64::INFINITY, f64::min);
-    (nearest_plane / step_world).floor().max(0.0)
 }
 
 #[cfg(test)]
@@ -133,7 +279,7 @@ mod tests {
     fn check(camera: &Camera, grid: &Grid, tolerance: f64) {
         let size = UVec2::new(40, 30);
         let domain = Aabb { min: DVec3::splat(-0.5), max: grid.dims().as_dvec3() - 0.5 };
-        let frame = RayFrame::new(camera, grid, size, &domain, 0.5);
+        let frame = RayFrame::new(camera, grid, size, &domain, &Steps::shells(0.5));
         assert_eq!((frame.start / 0.5).fract(), 0.0);
         assert!(frame.n_segments >= 1.0 && frame.n_segments <= 4.0 * grid.world_box().diagonal());
         for (x, y) in [(0, 0), (39, 29), (17, 3)] {
@@ -160,6 +306,81 @@ mod tests {
             for eye in [DVec3::new(50.0, 20.0, 30.0), grid.world_box().center() + 0.1, DVec3::new(1e4, 3.0, 2.0)] {
                 check(&Camera::look_at(eye, DVec3::new(5.0, 1.0, 4.0), DVec3::Z, projection).unwrap(), &grid, 1e-9);
             }
+        }
+    }
+
+    fn frame(placement: Placement, projection: Projection) -> (RayFrame, Camera, Grid) {
+        let grid = Grid::from_first_sample(
+            UVec3::new(20, 17, 9),
+            DVec3::new(1.0, 1.5, 2.0),
+            DVec3::new(3.0, -4.0, 5.0),
+            DMat3::IDENTITY,
+        )
+        .unwrap();
+        let eye = grid.world_box().center() + DVec3::new(40.0, 25.0, 12.0);
+        let camera = Camera::look_at(eye, grid.world_box().center(), DVec3::Z, projection).unwrap();
+        let domain = Aabb { min: DVec3::splat(-0.5), max: grid.dims().as_dvec3() - 0.5 };
+        let steps = Steps { step_world: 0.7, placement, coarsest: Level(2) };
+        (RayFrame::new(&camera, &grid, UVec2::new(40, 30), &domain, &steps), camera, grid)
+    }
+
+    /// Where surface k of pixel (x, y) lies in the world, from the eye.
+    fn surface(placement: Placement, (x, y): (u32, u32), k: f64) -> (DVec3, Camera, Grid) {
+        let (frame, camera, grid) = frame(placement, PERSPECTIVE);
+        let ray = frame.ray(x, y);
+        let q = frame.center + ray.at(k * 0.7 * ray.stretch);
+        (grid.world(IndexPos::from(SamplePos(q))).0 - camera.eye(), camera, grid)
+    }
+
+    const PERSPECTIVE: Projection = Projection::Perspective { fov_y: 0.8 };
+
+    #[test]
+    fn surfaces_lie_where_their_placement_says() {
+        for pixel in [(0, 0), (39, 29), (17, 3)] {
+            for k in [0.0, 4.0, 9.0] {
+                let whole_steps = |world: f64| (world / 0.7 - (world / 0.7).round()).abs() < 1e-9;
+                let (p, camera, _) = surface(Placement::ViewportPlanes, pixel, k);
+                assert!(whole_steps(p.dot(camera.forward())), "{p}");
+                let (p, ..) = surface(Placement::Shells, pixel, k);
+                assert!(whole_steps(p.length()), "{p}");
+                let (p, camera, grid) = surface(Placement::ObjectPlanes, pixel, k);
+                let direction = camera.pixel_rays(UVec2::new(40, 30)).pixel_ray(pixel.0, pixel.1).direction;
+                let steepest = direction.abs().to_array().iter().position(|c| *c == direction.abs().max_element());
+                let plane = grid.world(IndexPos::from(SamplePos(FIRST_PLANE))).0;
+                assert!(whole_steps((camera.eye() + p - plane)[steepest.unwrap()]), "{p}");
+            }
+        }
+    }
+
+    #[test]
+    fn rays_begin_at_the_eye_whatever_their_surfaces() {
+        let facets = Placement::TessellatedShells { facet_pixels: 16 };
+        for placement in [Placement::Shells, facets, Placement::ViewportPlanes, Placement::ObjectPlanes] {
+            let (frame, camera, grid) = frame(placement, PERSPECTIVE);
+            let ray = frame.ray(5, 21);
+            let eye = grid.world(IndexPos::from(SamplePos(frame.center + ray.at(ray.t_eye)))).0;
+            assert!((eye - camera.eye()).length() < 1e-9, "{placement:?}: {eye}");
+        }
+    }
+
+    #[test]
+    fn facets_touch_the_shells_at_their_corners_and_lie_inside_by_a_second_order() {
+        let gap = |facet_pixels| {
+            let (frame, ..) = frame(Placement::TessellatedShells { facet_pixels }, PERSPECTIVE);
+            let gaps = (0..30).flat_map(|y| (0..40).map(move |x| (x, y))).map(|(x, y)| 1.0 - frame.ray(x, y).stretch);
+            gaps.fold((f64::MAX, f64::MIN), |(low, high), g| (low.min(g), high.max(g)))
+        };
+        let (least, most) = gap(16);
+        assert!(least > -1e-12 && most < 0.05, "{least} {most}");
+        assert!((gap(8).1 / most - 0.25).abs() < 0.05 && (gap(4).1 / most - 1.0 / 16.0).abs() < 0.02);
+    }
+
+    #[test]
+    fn parallel_rays_see_all_shells_as_planes() {
+        let parallel = Projection::Orthographic { height: 30.0 };
+        let of = |placement| frame(placement, parallel).0.ray(3, 4);
+        for placement in [Placement::ViewportPlanes, Placement::TessellatedShells { facet_pixels: 5 }] {
+            assert_eq!(of(placement), of(Placement::Shells));
         }
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickSide, Camera, Grid, Knot, Level, Projection, TransferFunction};
 use brickfield_frame::{
-    BrickSet, Decode, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, QuadratureRule, RayFrame,
+    BrickSet, Decode, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, QuadratureRule, RayFrame, Steps,
     SampleFormat, Sampling,
 };
 
@@ -65,7 +65,7 @@ pub(crate) fn plan(bricks: BrickSet, transfer: TransferFunction, rule: Quadratur
     let features = features(&transfer, mode);
     FramePlan {
         dims,
-        rays: RayFrame::new(&camera, &grid, UVec2::new(20, 12), &domain, sampling.step_world()),
+        rays: RayFrame::new(&camera, &grid, UVec2::new(20, 12), &domain, &Steps::shells(sampling.step_world())),
         domain,
         visible: domain,
         sampling,

@@ -13,7 +13,7 @@ mod piece;
 
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Aabb, Camera, Image, Ray, TransferFunction, Volume};
-use brickfield_frame::RayFrame;
+use brickfield_frame::{RayFrame, Steps};
 use brickfield_optics::{alpha, transmittance};
 use rayon::prelude::*;
 
@@ -82,12 +82,12 @@ pub fn continuous(
     let cells = Cells::with_blocks(volume, transfer);
     // The frame's step is of no matter here: only its rays are used.
     let step = volume.grid().world_box().diagonal();
-    let frame = RayFrame::new(camera, volume.grid(), size, &domain, step);
+    let frame = RayFrame::new(camera, volume.grid(), size, &domain, &Steps::shells(step));
     let row = |y: u32| {
         let mut pieces = Pieces::new(transfer, options);
         let line = |x| {
             let ray = frame.ray(x, y);
-            let least = -frame.start - ray.t_anchor;
+            let least = ray.t_eye - ray.t_anchor;
             Line { anchor: frame.center + ray.anchor, direction: ray.direction, least }
         };
         (0..size.x).map(|x| integrate(&cells, &mut pieces, &line(x), &domain)).collect::<Vec<_>>()

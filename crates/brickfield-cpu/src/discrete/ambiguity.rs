@@ -15,13 +15,16 @@
 
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, Level, Span};
-use brickfield_frame::{FramePlan, IndexEntry, PlanRay};
+use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, PlanRay};
 use brickfield_optics::{Segment, alpha, transmittance};
 
 use super::field::{Field, Stored};
-use super::walk::{Part, clip, segments};
-use super::{node_values, relative, segment};
+use super::walk::{Part, clip, middle, parts, segments, whole};
+use super::{part_values, relative, segment};
+use crate::blocks::{Blocks, block_box};
 
+/// How far the cosines of a ray's angles to planes may be off: a few roundings of numbers below 1.
+pub(super) const TIE: f64 = 1e-6;
 /// Roundings of a term, times the unit roundoff of f32.
 const ROUNDING: f64 = 8.0 / (1u32 << 24) as f64;
 
@@ -53,34 +56,47 @@ impl Ambiguity {
     pub(super) fn of_ray<S: Stored>(&self, field: &Field<S>, ray: &PlanRay) -> f64 {
         let plan = field.plan;
         let domain = relative(&plan.domain, plan.rays.center);
-        let least = -plan.rays.start;
         let far = domain.extent().length() / ray.direction.length() + ray.t_anchor.abs();
         let delta = distance(plan, ray, far);
-        match clip(ray, &domain, least) {
-            Some(_) if clip(ray, &grown(&domain, -delta), least).is_none() => self.grazing(ray, &domain, delta, least),
-            None => self.grazing(ray, &domain, delta, least),
-            Some(span) if self.several_kinds || !self.jumps.is_empty() => self.inside(field, ray, span),
-            Some(_) => 0.0,
+        match clip(ray, &domain, ray.t_eye) {
+            Some(_) if clip(ray, &grown(&domain, -delta), ray.t_eye).is_none() => self.grazing(ray, &domain, delta),
+            None => self.grazing(ray, &domain, delta),
+            Some(span) => self.inside(field, ray, span),
         }
     }
 
     /// The opacity that a ray near the domain's surface may have at most.
-    fn grazing(&self, ray: &PlanRay, domain: &Aabb, delta: DVec3, least: f64) -> f64 {
-        clip(ray, &grown(domain, delta), least).map_or(0.0, |span| alpha(self.max_extinction * (span.end - span.start)))
+    fn grazing(&self, ray: &PlanRay, domain: &Aabb, delta: DVec3) -> f64 {
+        let span = clip(ray, &grown(domain, delta), ray.t_eye);
+        span.map_or(0.0, |span| alpha(self.max_extinction * (span.end - span.start)))
     }
 
     fn inside<S: Stored>(&self, field: &Field<S>, ray: &PlanRay, span: Span) -> f64 {
+        let sampling = &field.plan.sampling;
+        let delta = distance(field.plan, ray, span.start.abs().max(span.end.abs()));
+        let appearing = match sampling.lengths() {
+            Lengths::True => 0.0,
+            Lengths::Nominal => self.appearing(field, ray, span, delta),
+        };
+        let faces_matter = self.several_kinds && sampling.division() == Division::Ray;
+        match faces_matter || !self.jumps.is_empty() {
+            true => appearing + self.changing(field, ray, span, delta),
+            false => appearing,
+        }
+    }
+
+    /// The change by nodes that fall on the other side of a jump.
+    fn changing<S: Stored>(&self, field: &Field<S>, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
         let plan = field.plan;
-        let delta = distance(plan, ray, span.start.abs().max(span.end.abs()));
         let (mut bound, mut least_depth) = (0.0, 0.0);
         let rule = plan.sampling.rule();
-        for part in segments(span, plan.sampling.step_world()) {
+        for part in parts(plan, ray, span) {
             let at = |x: f64| plan.rays.center + ray.at(part.at(x));
-            if !rule.nodes().iter().any(|x| self.may_be_close(field, at(*x), delta)) {
-                least_depth += segment(plan, node_values(rule, |x| field.at(at(x))), part.length()).depth;
+            if !rule.nodes().iter().any(|x| self.may_be_close(field, part, at(*x), delta)) {
+                least_depth += segment(plan, part_values(field, ray, part), part.length).depth;
                 continue;
             }
-            let nodes: Vec<Values> = rule.nodes().iter().map(|x| self.values(field, at(*x), delta)).collect();
+            let nodes: Vec<Values> = rule.nodes().iter().map(|x| self.values(field, part, at(*x), delta)).collect();
             let (change, least) = spread(plan, &nodes, part);
             bound += transmittance(least_depth) * change;
             least_depth += least;
@@ -88,19 +104,44 @@ impl Ambiguity {
         bound
     }
 
-    /// Whether a node at `q` could be close to a jump; quick, and never wrongly no.
-    fn may_be_close<S: Stored>(&self, field: &Field<S>, q: DVec3, delta: DVec3) -> bool {
-        let q = field.clamped(q);
-        !self.jumps.is_empty() || field.index_cell(q - delta) != field.index_cell(q + delta)
+    /// The change by segments of nominal length whose middle is within rounding of where what is divided ends: they may count
+    /// or not.
+    fn appearing<S: Stored>(&self, field: &Field<S>, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
+        let plan = field.plan;
+        let of = |span: Span, b: Aabb, level: Level, cell| {
+            let nominal = plan.sampling.step_world() * f64::from(level.stride());
+            let step = nominal * ray.stretch;
+            let beside = Span { start: span.start - 0.5 * step, end: span.end + 0.5 * step };
+            let doubtful = segments(beside, step).filter(|s| is_at_surface(ray.at(middle(s)), &b, delta));
+            let segment = |s| {
+                let part = whole(s, nominal, cell);
+                let seen = segment(plan, part_values(field, ray, part), part.length);
+                difference(&seen, &Segment::default())
+            };
+            doubtful.map(segment).sum::<f64>()
+        };
+        match plan.sampling.division() {
+            Division::Ray => of(span, relative(&plan.domain, plan.rays.center), Level(0), None),
+            Division::Brick => {
+                Blocks::new(plan, ray, span).map(|c| of(c.span, block_box(plan, &c), c.entry.level(), Some(c.cell))).sum()
+            }
+        }
     }
 
-    /// The values that a node at `q` may have.
-    fn values<S: Stored>(&self, field: &Field<S>, q: DVec3, delta: DVec3) -> Values {
+    /// Whether a node at `q` could be close to a jump; quick, and never wrongly no.
+    fn may_be_close<S: Stored>(&self, field: &Field<S>, part: Part, q: DVec3, delta: DVec3) -> bool {
         let q = field.clamped(q);
-        let own = field.index_cell(q);
+        let at_face = || part.cell.is_none() && field.index_cell(q - delta) != field.index_cell(q + delta);
+        !self.jumps.is_empty() || at_face()
+    }
+
+    /// The values that a node of `part` at `q` may have.
+    fn values<S: Stored>(&self, field: &Field<S>, part: Part, q: DVec3, delta: DVec3) -> Values {
+        let q = field.clamped(q);
+        let own = part.cell.unwrap_or_else(|| field.index_cell(q));
         let mut values = vec![field.in_block(own, q)];
         self.beyond_jumps(field, own, q, delta, &mut values);
-        if !self.several_kinds {
+        if !self.several_kinds || part.cell.is_some() {
             return values;
         }
         let kind = |c: UVec3| Kind::of(field.plan.index.at(c));
@@ -130,6 +171,12 @@ impl Ambiguity {
 /// How far a position of the ray may be off along each axis, in voxels, for parameters up to `far`.
 fn distance(plan: &FramePlan, ray: &PlanRay, far: f64) -> DVec3 {
     (plan.rays.center.abs() + ray.anchor.abs() + ray.direction.abs() * (far + ray.t_anchor.abs())) * ROUNDING
+}
+
+/// Whether a point is within `delta` of a box's surface.
+fn is_at_surface(p: DVec3, b: &Aabb, delta: DVec3) -> bool {
+    let is_in = |b: &Aabb| p.cmpge(b.min).all() && p.cmple(b.max).all();
+    is_in(&grown(b, delta)) && !is_in(&grown(b, -delta))
 }
 
 fn grown(b: &Aabb, delta: DVec3) -> Aabb {
@@ -167,14 +214,14 @@ fn cells(low: UVec3, high: UVec3) -> impl Iterator<Item = UVec3> {
 /// How far a segment's contribution may stray, and the least depth it may have.
 fn spread(plan: &FramePlan, nodes: &[Values], part: Part) -> (f64, f64) {
     let second: &[Option<f64>] = nodes.get(1).map_or(&[None], |v| v);
-    let own = segment(plan, [nodes[0][0], second[0]], part.length());
+    let own = segment(plan, [nodes[0][0], second[0]], part.length);
     let (mut change, mut least) = (0.0f64, own.depth);
     if nodes[0].len() * second.len() == 1 {
         return (change, least);
     }
     for a in &nodes[0] {
         for b in second {
-            let other = segment(plan, [*a, *b], part.length());
+            let other = segment(plan, [*a, *b], part.length);
             change = change.max(difference(&own, &other));
             least = least.min(other.depth);
         }

@@ -7,7 +7,7 @@ mod ambiguity;
 mod field;
 mod walk;
 
-use brickfield_core::glam::DVec3;
+use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Aabb, Image};
 use brickfield_frame::{FramePlan, PlanRay, SampleFormat};
 use brickfield_optics::{QuadratureRule, RayState, Segment};
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use ambiguity::Ambiguity;
 use field::{Field, Float32, Stored, Unorm8, Unorm16};
-use walk::{clip, segments};
+use walk::{Part, clip, parts};
 
 /// What a plan's sum is, and how far f32 may stray from it where the field jumps.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,7 +67,7 @@ fn render<S: Stored>(plan: &FramePlan) -> Discrete {
     let field = Field::<S>::new(plan);
     let ambiguity = Ambiguity::new(&field);
     let size = plan.size();
-    let row = |y: u32| (0..size.x).map(|x| pixel(&field, &ambiguity, &plan.rays.ray(x, y))).collect::<Vec<_>>();
+    let row = |y: u32| (0..size.x).map(|x| pixel(&field, &ambiguity, UVec2::new(x, y))).collect::<Vec<_>>();
     let rows: Vec<Vec<Pixel>> = (0..size.y).into_par_iter().map(row).collect();
     let mut image = Image::transparent(size);
     for (to, from) in image.pixels_mut().iter_mut().zip(rows.iter().flatten()) {
@@ -82,16 +82,23 @@ fn render<S: Stored>(plan: &FramePlan) -> Discrete {
     }
 }
 
-fn pixel<S: Stored>(field: &Field<S>, ambiguity: &Ambiguity, ray: &PlanRay) -> Pixel {
-    let mut pixel = Pixel { ambiguity: ambiguity.of_ray(field, ray), ..Pixel::default() };
-    let plan = field.plan;
-    let Some(span) = clip(ray, &relative(&plan.domain, plan.rays.center), -plan.rays.start) else { return pixel };
-    let rule = plan.sampling.rule();
+fn pixel<S: Stored>(field: &Field<S>, ambiguity: &Ambiguity, at: UVec2) -> Pixel {
+    let ray = field.plan.rays.ray(at.x, at.y);
+    let own = along(field, &ray);
+    let across = field.plan.rays.ray_across_tie(at.x, at.y, ambiguity::TIE).map(|other| along(field, &other));
+    let tie = across.map_or(0.0, |other| greatest_difference(&own.rgba, &other.rgba));
+    Pixel { ambiguity: ambiguity.of_ray(field, &ray) + tie, ..own }
+}
+
+/// The sum along a ray.
+fn along<S: Stored>(field: &Field<S>, ray: &PlanRay) -> Pixel {
+    let (plan, mut pixel) = (field.plan, Pixel::default());
+    let Some(span) = clip(ray, &relative(&plan.domain, plan.rays.center), ray.t_eye) else { return pixel };
     let mut state = RayState::default();
-    for part in segments(span, plan.sampling.step_world()) {
-        let values = node_values(rule, |x| field.at(plan.rays.center + ray.at(part.at(x))));
-        pixel.n_samples += rule.nodes().len() as u64;
-        let segment = segment(plan, values, part.length());
+    for part in parts(plan, ray, span) {
+        let values = part_values(field, ray, part);
+        pixel.n_samples += plan.sampling.rule().nodes().len() as u64;
+        let segment = segment(plan, values, part.length);
         if segment.depth > 0.0 {
             pixel.n_visible_samples += n_visible(field, &values);
             state.push(segment);
@@ -99,6 +106,21 @@ fn pixel<S: Stored>(field: &Field<S>, ambiguity: &Ambiguity, ray: &PlanRay) -> P
     }
     pixel.rgba = state.rgba();
     pixel
+}
+
+fn greatest_difference(a: &[f64; 4], b: &[f64; 4]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
+}
+
+/// The values at the nodes of a segment.
+fn part_values<S: Stored>(field: &Field<S>, ray: &PlanRay, part: Part) -> [Option<f64>; 2] {
+    node_values(field.plan.sampling.rule(), |x| {
+        let q = field.plan.rays.center + ray.at(part.at(x));
+        match part.cell {
+            Some(cell) => field.in_block(cell, field.clamped(q)),
+            None => field.at(q),
+        }
+    })
 }
 
 /// The values at a rule's nodes, `None` in transparent blocks (and for the second node of a rule that has one).

@@ -2,21 +2,25 @@
 
 use std::ops::Range;
 
-use brickfield_core::Span;
 use brickfield_core::glam::DVec3;
-use brickfield_frame::{IndexEntry, PlanRay};
+use brickfield_core::{Level, Span};
+use brickfield_frame::{Division, IndexEntry, Lengths, PlanRay, Sampling};
 
 use super::batch;
 use super::brick::{LANES, Nodes, Stored};
 use super::detail::Sieve;
 use super::scene::{Block, Scene};
 use super::segment::{Ray32, Segment32, segment};
+use crate::blocks::Blocks;
 
-/// A ray inside the domain: segments first..end, the first and the last of them cut to the span.
+/// What is divided of a ray: segments first..end, the first and the last of them cut to the span.
 struct Path<'a> {
     ray: &'a PlanRay,
     span: Span,
     step: f64,
+    /// The length that the light of a whole segment is computed for.
+    length: f32,
+    lengths: Lengths,
     /// Segments per world unit, and world units per voxel along each axis.
     per_unit: f64,
     reciprocal: DVec3,
@@ -24,14 +28,47 @@ struct Path<'a> {
     end: i64,
 }
 
-impl Path<'_> {
-    /// Near end and length of segment `k`.
-    fn segment(&self, k: i64) -> (f64, f64) {
-        let start = (k as f64 * self.step).max(self.span.start);
-        (start, (((k + 1) as f64 * self.step).min(self.span.end) - start).max(0.0))
+impl<'a> Path<'a> {
+    /// A span, divided by the steps of a level.
+    #[inline(always)]
+    fn new(sampling: &Sampling, ray: &'a PlanRay, span: Span, level: Level) -> Path<'a> {
+        let nominal = sampling.step_world() * f64::from(level.stride());
+        let step = nominal * ray.stretch;
+        let length = match sampling.lengths() {
+            Lengths::True => step,
+            Lengths::Nominal => nominal,
+        };
+        Path {
+            ray,
+            span,
+            step,
+            length: length as f32,
+            lengths: sampling.lengths(),
+            per_unit: 1.0 / step,
+            reciprocal: ray.direction.recip(),
+            first: floor(span.start / step),
+            end: floor(span.end / step) + 1,
+        }
     }
 
-    /// Whether segment `k` has its full length.
+    /// Near end of segment `k`, how far its far end is, and the length that its light is computed for.
+    fn segment(&self, k: i64) -> (f64, f64, f32) {
+        let uncut = k as f64 * self.step;
+        match self.lengths {
+            Lengths::True => {
+                let start = uncut.max(self.span.start);
+                let length = (((k + 1) as f64 * self.step).min(self.span.end) - start).max(0.0);
+                (start, length, length as f32)
+            }
+            Lengths::Nominal => {
+                let middle = uncut + 0.5 * self.step;
+                let counts = self.span.start <= middle && middle < self.span.end;
+                (uncut, self.step, if counts { self.length } else { 0.0 })
+            }
+        }
+    }
+
+    /// Whether segment `k` is not cut.
     fn is_whole(&self, k: i64) -> bool {
         self.first < k && k < self.end - 1
     }
@@ -44,15 +81,13 @@ const MOST: i64 = 1 << 23;
 #[inline(always)]
 pub(super) fn march<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
     let plan = scene.plan;
-    let least = -plan.rays.start;
     let domain = (plan.domain.min - scene.center, plan.domain.max - scene.center);
-    let Some(span) = clip(ray, domain, least) else { return [0.0; 4] };
-    let step = plan.sampling.step_world();
-    let (per_unit, reciprocal) = (1.0 / step, ray.direction.recip());
-    let (first, end) = (floor(span.start / step), floor(span.end / step) + 1);
-    let path = Path { ray, span, step, per_unit, reciprocal, first, end };
+    let Some(span) = clip(ray, domain, ray.t_eye) else { return [0.0; 4] };
     let mut state = Ray32::default();
-    along(scene, &path, runs, &mut state);
+    match plan.sampling.division() {
+        Division::Ray => along(scene, &Path::new(&plan.sampling, ray, span, Level(0)), runs, &mut state),
+        Division::Brick => brick_by_brick(scene, ray, span, &mut state),
+    }
     state.rgba()
 }
 
@@ -81,13 +116,52 @@ fn along<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, runs: &[Ra
     }
 }
 
+/// The segments of each brick.
+#[inline(always)]
+fn brick_by_brick<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRay, span: Span, state: &mut Ray32) {
+    let nodes = scene.plan.sampling.rule().nodes();
+    let nodes = (nodes[0], nodes[nodes.len() - 1]);
+    let floor = scene.plan.sampling.transmittance_floor();
+    for crossing in Blocks::new(scene.plan, ray, span) {
+        let IndexEntry::Resident { slot, level } = crossing.entry else { continue };
+        let path = Path::new(&scene.plan.sampling, ray, crossing.span, level);
+        let block = scene.block_of(crossing.cell);
+        let resident = Resident { block: &block, slot, level };
+        state.push(single_in(scene, &path, &block, path.first));
+        let n = path.end - 1 - (path.first + 1);
+        if n > 0 {
+            resident.run(scene, &path, path.first + 1, nodes, n.min(MOST) as i32, state);
+        }
+        if path.end - 1 > path.first {
+            state.push(single_in(scene, &path, &block, path.end - 1));
+        }
+        if state.transmittance < floor || state.transmittance == 0.0 {
+            return;
+        }
+    }
+}
+
+/// One segment whose nodes lie in a block.
+fn single_in<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, block: &Block, k: i64) -> Segment32 {
+    one(scene, path, k, |q| scene.value_in(block, q))
+}
+
 /// One segment, wherever its nodes lie.
 fn single<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, k: i64) -> Segment32 {
+    one(scene, path, k, |q| scene.value(q))
+}
+
+fn one<const N: usize, S: Stored>(
+    scene: &Scene<N, S>,
+    path: &Path,
+    k: i64,
+    value: impl Fn(DVec3) -> Option<f32>,
+) -> Segment32 {
     let rule = scene.plan.sampling.rule();
-    let (start, length) = path.segment(k);
-    let value = |x: &f64| scene.value(scene.center + path.ray.at(start + length * x));
+    let (start, length, weight) = path.segment(k);
+    let value = |x: &f64| value(scene.center + path.ray.at(start + length * x));
     let nodes = rule.nodes();
-    segment(rule, &scene.transfer, [value(&nodes[0]), nodes.get(1).and_then(value)], length as f32)
+    segment(rule, &scene.transfer, [value(&nodes[0]), nodes.get(1).and_then(value)], weight)
 }
 
 /// All whole segments from `k` on whose nodes lie in the block of segment `k`'s first node; returns how many they are.
@@ -105,22 +179,50 @@ fn run<const N: usize, S: Stored>(
     let exit = exit(scene, path, &block);
     let n = ((exit * path.per_unit - far).ceil() - k as f64).min((to.min(path.end - 1) - k).min(MOST) as f64) as i32;
     if let (IndexEntry::Resident { slot, level }, true) = (block.entry, n > 0) {
-        let scale = 1.0 / f64::from(level.stride());
+        Resident { block: &block, slot, level }.run(scene, path, k, (near, far), n, state);
+    }
+    i64::from(n)
+}
+
+/// A block that is a brick.
+struct Resident<'a> {
+    block: &'a Block,
+    slot: u32,
+    level: Level,
+}
+
+impl Resident<'_> {
+    /// Whole segments `k..k + n`, all of whose nodes lie in the brick.
+    #[inline(always)]
+    fn run<const N: usize, S: Stored>(
+        &self,
+        scene: &Scene<N, S>,
+        path: &Path,
+        k: i64,
+        (near, far): (f64, f64),
+        n: i32,
+        state: &mut Ray32,
+    ) {
+        let t = (k as f64 + near) * path.step;
+        let scale = 1.0 / f64::from(self.level.stride());
         let array = |v: DVec3| v.as_vec3().to_array();
+        let corner = self.block.corner;
         let nodes = Nodes {
-            origin: array((scene.center + path.ray.at(t) - block.corner) * scale),
+            origin: array((scene.center + path.ray.at(t) - corner) * scale),
             change: array(path.ray.direction * (path.step * scale)),
-            last: array(((scene.last - block.corner) * scale).min(DVec3::splat((N - 1) as f64))),
+            last: array(((scene.last - corner) * scale).min(DVec3::splat((N - 1) as f64))),
             bias: scene.bias,
         };
         let far = (far - near) as f32;
-        let mut inner = Inner { brick: scene.brick(slot), nodes, far, waiting: [0; 2 * LANES] };
+        let brick = scene.brick(self.slot);
+        let mut inner = Inner { brick, nodes, far, length: path.length, waiting: [0; 2 * LANES] };
         match &scene.plan.occupancy {
-            Some(occupancy) => inner.push_visible(scene, &Sieve::<N>::new(nodes, far, occupancy.brick(slot)), n, state),
+            Some(occupancy) => {
+                inner.push_visible(scene, &Sieve::<N>::new(nodes, far, occupancy.brick(self.slot)), n, state);
+            }
             None => inner.push_all(scene, n, state),
         }
     }
-    i64::from(n)
 }
 
 /// Where the ray leaves a block.
@@ -145,6 +247,8 @@ struct Inner<'a> {
     nodes: Nodes,
     /// Distance between the rule's nodes, in segments.
     far: f32,
+    /// The length that a segment's light is computed for.
+    length: f32,
     /// Segments that wait.
     waiting: [i32; 2 * LANES],
 }
@@ -207,7 +311,7 @@ impl Inner<'_> {
         for (at, k) in at.iter_mut().zip(&self.waiting) {
             *at = *k as f32;
         }
-        let (rule, length) = (scene.plan.sampling.rule(), scene.plan.sampling.step_world() as f32);
+        let (rule, length) = (scene.plan.sampling.rule(), self.length);
         let near = scene.first_values(&self.nodes, self.brick, &at, n);
         match rule.nodes().len() {
             1 => batch::one_node(rule, &scene.transfer, &near, n, length, state),

@@ -61,7 +61,13 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
         // Truncation is floor: a clamped position is not negative. Half a sample away from every face, the quotient's
         // rounding does not matter.
         let sample = q.clamp(DVec3::ZERO, self.last).as_ivec3().as_dvec3();
-        let cell = ((sample + 0.5) * (1.0 / n_cells)).as_ivec3().as_uvec3().min(dims - 1);
+        self.block_of(((sample + 0.5) * (1.0 / n_cells)).as_ivec3().as_uvec3().min(dims - 1))
+    }
+
+    /// The block of an index cell.
+    #[inline(always)]
+    pub(super) fn block_of(&self, cell: UVec3) -> Block {
+        let (n_cells, dims) = ((N - 1) as f64, self.plan.index.dims());
         let entry = self.plan.index.at(cell);
         let level = u32::from(entry.level().0);
         let low = cell >> level << level;
@@ -77,7 +83,11 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
 
     /// The value at a sample position, as a number of the value scale; `None` where its block is transparent.
     pub(super) fn value(&self, q: DVec3) -> Option<f32> {
-        let block = self.block(q);
+        self.value_in(&self.block(q), q)
+    }
+
+    /// The value that a block has at a sample position.
+    pub(super) fn value_in(&self, block: &Block, q: DVec3) -> Option<f32> {
         let IndexEntry::Resident { slot, level } = block.entry else { return None };
         let s = (q.clamp(DVec3::ZERO, self.last) - block.corner) / f64::from(level.stride());
         let nodes =

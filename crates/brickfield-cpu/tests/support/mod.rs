@@ -8,8 +8,8 @@ use brickfield_core::{
     Aabb, BrickId, BrickLayout, BrickSide, Camera, Grid, Knot, Level, Projection, ScalarType, TransferFunction, Volume,
 };
 use brickfield_frame::{
-    Beams, BrickSet, Decode, FeatureSet, FramePlan, IndexEntry, IndexGrid, MacrocellRanges, Mode, Overview, RayFrame,
-    SampleFormat, Sampling,
+    Beams, BrickSet, Decode, Division, FeatureSet, FramePlan, IndexEntry, IndexGrid, Lengths, MacrocellRanges, Mode,
+    Overview, Placement, RayFrame, SampleFormat, Sampling, Steps,
 };
 use brickfield_optics::QuadratureRule;
 
@@ -24,6 +24,9 @@ pub struct Setup<'a> {
     pub step_world: f64,
     pub rule: QuadratureRule,
     pub mode: Mode,
+    pub placement: Placement,
+    pub division: Division,
+    pub lengths: Lengths,
     /// Level of the coarsest block wanted around an index cell.
     pub level: &'a dyn Fn(UVec3) -> u8,
     /// Whether transparent bricks are left out.
@@ -68,6 +71,9 @@ impl<'a> Setup<'a> {
             step_world: 0.5,
             rule: QuadratureRule::MidpointExponential,
             mode: Mode::Exact,
+            placement: Placement::Shells,
+            division: Division::Ray,
+            lengths: Lengths::True,
             level: &|_| 0,
             skip: Skip::Nothing,
         }
@@ -77,12 +83,14 @@ impl<'a> Setup<'a> {
         let grid = self.volume.grid();
         let domain = whole(self.volume).intersection(&self.clip);
         let (index, bricks, visible) = cut(self);
+        let sampling = Sampling::new(self.step_world, self.rule, self.mode).unwrap();
+        let sampling = sampling.placed(self.placement).unwrap().divided(self.division).weighted(self.lengths).unwrap();
         let mut plan = FramePlan {
             dims: grid.dims(),
-            rays: RayFrame::new(&self.camera, grid, self.size, &domain, self.step_world),
+            rays: RayFrame::new(&self.camera, grid, self.size, &domain, &Steps::of(&sampling, Level(3))),
             domain,
             visible: visible.intersection(&domain),
-            sampling: Sampling::new(self.step_world, self.rule, self.mode).unwrap(),
+            sampling,
             transfer: self.transfer.clone(),
             index,
             occupancy: (self.skip == Skip::Transparent)

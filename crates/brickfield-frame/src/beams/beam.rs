@@ -153,7 +153,7 @@ mod tests {
     fn outside(camera: &Camera, size: UVec2) -> (f32, f32) {
         let grid = Grid::axis_aligned(UVec3::new(60, 50, 40), DVec3::new(1.0, 0.7, 2.0)).unwrap();
         let domain = Aabb { min: DVec3::splat(-0.5), max: grid.dims().as_dvec3() - 0.5 };
-        let rays = RayFrame::new(camera, &grid, size, &domain, 0.5);
+        let rays = RayFrame::new(camera, &grid, size, &domain, &crate::Steps::shells(0.5));
         let (mut of_beam, mut of_corners) = (f32::MIN, f32::MIN);
         for tile in (0..size.x / 8).flat_map(|x| (0..size.y / 8).map(move |y| UVec2::new(x, y) * 8)) {
             let (columns, rows) = (tile.x..tile.x + 8, tile.y..tile.y + 8);

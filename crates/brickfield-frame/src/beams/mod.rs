@@ -9,7 +9,7 @@ use brickfield_core::Level;
 use brickfield_core::glam::UVec2;
 use rayon::prelude::*;
 
-use crate::{FramePlan, IndexEntry, IndexGrid, QuadratureRule};
+use crate::{Division, FramePlan, IndexEntry, IndexGrid, Placement, QuadratureRule};
 use beam::Beam;
 pub use overview::Overview;
 
@@ -36,6 +36,10 @@ impl Beams {
     ///
     /// About 1 us a tile, over all threads of the current rayon pool.
     pub fn of(plan: &FramePlan, overview: &Overview) -> Option<Beams> {
+        // Beams count segments of shells; bricks have segments of their own.
+        if plan.sampling.placement() != Placement::Shells || plan.sampling.division() == Division::Brick {
+            return None;
+        }
         // Between levels, what is dark need not be connected: a pre-integrated segment could cross something visible.
         if plan.sampling.rule() == QuadratureRule::PreIntegrated && has_levels(&plan.index) {
             return None;

@@ -10,7 +10,7 @@ use brickfield_core::{
     Aabb, BrickLayout, BrickSide, Camera, Grid, Knot, Level, Projection, TransferFunction, ValueRange,
 };
 use brickfield_frame::{
-    BrickSet, Decode, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, QuadratureRule, RayFrame,
+    BrickSet, Decode, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, QuadratureRule, RayFrame, Steps,
     SampleFormat, Sampling,
 };
 
@@ -99,7 +99,7 @@ impl Scene {
         let decode = Decode { scale: 1.0, offset: 0.0 };
         FramePlan {
             dims: self.dims,
-            rays: RayFrame::new(&self.camera, &grid, self.size, &domain, self.step),
+            rays: RayFrame::new(&self.camera, &grid, self.size, &domain, &Steps::shells(self.step)),
             domain,
             visible: visible.unwrap_or(Aabb { min: domain.min, max: domain.min }),
             sampling: Sampling::new(self.step, self.rule, self.mode).unwrap(),
