@@ -25,6 +25,7 @@ pub(crate) struct Scene {
     /// And the map that is in it.
     occupancy: (Slot, Held<Occupancy>),
     beams: Slot,
+    facets: Slot,
 }
 
 /// A buffer that grows when it must, and how much of it is used.
@@ -48,6 +49,7 @@ impl Scene {
             seen_before: Slot::new("rays between passes", vk::BufferUsageFlags::STORAGE_BUFFER),
             occupancy: (Slot::new("the occupancy of bricks", vk::BufferUsageFlags::STORAGE_BUFFER), Held::nothing()),
             beams: Slot::new("the beams", vk::BufferUsageFlags::STORAGE_BUFFER),
+            facets: Slot::new("the facets", vk::BufferUsageFlags::STORAGE_BUFFER),
         })
     }
 
@@ -82,6 +84,11 @@ impl Scene {
             let spans = plan.beams.as_ref().ok_or_else(|| missing("beams"))?.spans();
             let bytes = bytemuck::cast_slice(&spans);
             staging.fill(queue, &[(self.beams.reserve(&self.device, bytes.len())?, bytes)])?;
+        }
+        if pipeline.binds(12) {
+            let planes = plan.rays.facet_planes();
+            let bytes = bytemuck::cast_slice(&planes);
+            staging.fill(queue, &[(self.facets.reserve(&self.device, bytes.len())?, bytes)])?;
         }
         Ok(uniforms)
     }
@@ -123,6 +130,7 @@ impl Scene {
             8 => self.seen_before.resource(),
             9 => self.occupancy.0.resource(),
             10 => self.beams.resource(),
+            12 => self.facets.resource(),
             _ => None,
         }
     }

@@ -38,6 +38,15 @@ impl RayFrame {
         normal / normal.dot(a)
     }
 
+    /// The planes of all facets as shaders read them: n.x, n.y, n.z - 1, 0.
+    pub fn facet_planes(&self) -> Vec<[f32; 4]> {
+        let plane = |facet| {
+            let n = self.facet_normal(facet);
+            [n.x as f32, n.y as f32, (n.z - 1.0) as f32, 0.0]
+        };
+        (0..self.n_facets()).map(plane).collect()
+    }
+
     /// A facet's corners, in pixels from the picture's upper left corner.
     pub(crate) fn facet_corners(&self, facet: u32) -> [DVec2; 3] {
         let (square, n) = (facet / 2, self.facet_squares().x);

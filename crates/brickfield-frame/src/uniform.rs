@@ -20,7 +20,7 @@ pub struct FrameUniforms {
     pub anchor_down: [f32; 4],
     /// Direction of the picture's centre, voxels per world unit; w: least parameter (0 or minus the start).
     pub direction: [f32; 4],
-    /// Change of the direction a pixel to the right; w: step in world units.
+    /// Change of the direction a pixel to the right; w: nominal step in world units.
     pub direction_right: [f32; 4],
     /// Change of the direction a pixel down; w: transmittance floor.
     pub direction_down: [f32; 4],
@@ -43,6 +43,12 @@ pub struct FrameUniforms {
     pub atlas_bricks: [u32; 4],
     /// Width and height of the picture; z: first row of the pass; w: pixels along a beam's tile (1 without beams).
     pub size: [u32; 4],
+    /// The first object-aligned planes that rays towards greater coordinates meet; w: pixels along a facet's side.
+    pub planes_low: [f32; 4],
+    /// The first that rays towards smaller coordinates meet; w: squares of facets in a row of the picture.
+    pub planes_high: [f32; 4],
+    /// Distance between planes a voxel apart, in world units; w: reserved.
+    pub voxel_world: [f32; 4],
 }
 
 /// A transfer function's knot.
@@ -80,6 +86,9 @@ impl FrameUniforms {
             index_dims: uint4(plan.index.dims(), plan.transfer.knots().len() as u32),
             atlas_bricks: uint4(atlas.bricks, plan.bricks.side().n_samples()),
             size: [rays.size.x, rays.size.y, 0, plan.beams.as_ref().map_or(1, |b| b.tile_side())],
+            planes_low: float4(rays.planes.low, f64::from(rays.facet_pixels())),
+            planes_high: float4(rays.planes.high, f64::from(rays.facet_squares().x)),
+            voxel_world: float4(rays.planes.voxel_world, 0.0),
         }
         .in_pass(&whole)
     }

@@ -6,7 +6,7 @@ use wesl::{CompileOptions, Features, ManglerKind, ModulePath, VirtualResolver, W
 
 use crate::{Entry, ShaderError, Variant};
 
-const EMBEDDED: [(&str, &str); 9] = [
+const EMBEDDED: [(&str, &str); 10] = [
     ("frame", include_str!("wesl/frame.wesl")),
     ("scalar", include_str!("wesl/scalar.wesl")),
     ("transfer", include_str!("wesl/transfer.wesl")),
@@ -14,6 +14,7 @@ const EMBEDDED: [(&str, &str); 9] = [
     ("bricks", include_str!("wesl/bricks.wesl")),
     ("quadrature", include_str!("wesl/quadrature.wesl")),
     ("preintegrated", include_str!("wesl/preintegrated.wesl")),
+    ("segments", include_str!("wesl/segments.wesl")),
     ("march", include_str!("wesl/march.wesl")),
     ("evaluate", include_str!("wesl/evaluate.wesl")),
 ];

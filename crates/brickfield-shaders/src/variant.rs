@@ -1,6 +1,8 @@
 //! Which shader a plan needs.
 
-use brickfield_frame::{Feature, FeatureSet, FramePlan, QuadratureRule, ShaderFunction};
+use brickfield_frame::{
+    Division, Feature, FeatureSet, FramePlan, Lengths, Placement, QuadratureRule, Sampling, ShaderFunction,
+};
 
 use crate::passes::has_long_rays;
 
@@ -14,6 +16,8 @@ pub struct Variant {
     pub features: FeatureSet,
     /// How segments are integrated.
     pub rule: QuadratureRule,
+    /// Between which surfaces segments lie, of what, and for which lengths they count.
+    pub segments: Segments,
     /// How knots are searched.
     pub search: KnotSearch,
     /// Rays are too long for one pass ([`crate::passes`]), and go on where earlier passes ended.
@@ -22,6 +26,70 @@ pub struct Variant {
     pub integer_samples: bool,
     /// What is run.
     pub entry: Entry,
+}
+
+/// The segments of a sampling, as far as shaders differ.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub struct Segments {
+    pub surfaces: Surfaces,
+    pub division: Division,
+    pub lengths: Lengths,
+}
+
+/// The kinds of [`Placement`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum Surfaces {
+    #[default]
+    Shells,
+    TessellatedShells,
+    ViewportPlanes,
+    ObjectPlanes,
+}
+
+impl Segments {
+    /// The segments of a sampling.
+    pub fn of(sampling: &Sampling) -> Segments {
+        let surfaces = match sampling.placement() {
+            Placement::Shells => Surfaces::Shells,
+            Placement::TessellatedShells { .. } => Surfaces::TessellatedShells,
+            Placement::ViewportPlanes => Surfaces::ViewportPlanes,
+            Placement::ObjectPlanes => Surfaces::ObjectPlanes,
+        };
+        Segments { surfaces, division: sampling.division(), lengths: sampling.lengths() }
+    }
+
+    /// All segments that shaders tell apart.
+    pub fn all() -> impl Iterator<Item = Segments> {
+        let divisions = [Division::Ray, Division::Brick].into_iter();
+        let pairs = divisions.flat_map(|d| [Lengths::True, Lengths::Nominal].map(|l| (d, l)));
+        pairs.flat_map(|(division, lengths)| Surfaces::ALL.map(|surfaces| Segments { surfaces, division, lengths }))
+    }
+
+    fn conditions(self) -> impl Iterator<Item = (String, bool)> {
+        let surfaces = Surfaces::ALL.into_iter().map(move |s| (s.condition().to_owned(), s == self.surfaces));
+        let others = [
+            ("divide_bricks".to_owned(), self.division == Division::Brick),
+            ("nominal_lengths".to_owned(), self.lengths == Lengths::Nominal),
+        ];
+        surfaces.chain(others)
+    }
+}
+
+impl Surfaces {
+    /// All kinds.
+    pub const ALL: [Surfaces; 4] =
+        [Surfaces::Shells, Surfaces::TessellatedShells, Surfaces::ViewportPlanes, Surfaces::ObjectPlanes];
+
+    const fn condition(self) -> &'static str {
+        match self {
+            Surfaces::Shells => "shells",
+            Surfaces::TessellatedShells => "tessellated_shells",
+            Surfaces::ViewportPlanes => "viewport_planes",
+            Surfaces::ObjectPlanes => "object_planes",
+        }
+    }
 }
 
 /// What makes a ray ask for bricks.
@@ -98,6 +166,7 @@ impl Variant {
         Variant {
             features: plan.features,
             rule: plan.sampling.rule(),
+            segments: Segments::of(&plan.sampling),
             search: KnotSearch::of(plan),
             long_rays: entry == Entry::March && has_long_rays(plan),
             integer_samples: plan.reads_integers(),
@@ -116,12 +185,13 @@ impl Variant {
         let derived = [
             ("one_node", !two_nodes),
             ("two_nodes", two_nodes),
-            ("bricks", BRICKS.into_iter().any(has)),
+            ("bricks", BRICKS.into_iter().any(has) || self.segments.division == Division::Brick),
             ("long_rays", self.long_rays),
             ("integer_samples", self.integer_samples),
         ];
         let derived = derived.into_iter().map(|(name, holds)| (name.to_owned(), holds));
-        features.chain(rules).chain(functions).chain(self.search.conditions()).chain(derived).collect()
+        let segments = self.segments.conditions();
+        features.chain(rules).chain(segments).chain(functions).chain(self.search.conditions()).chain(derived).collect()
     }
 }
 

@@ -4,7 +4,7 @@ use std::mem::{offset_of, size_of};
 
 use brickfield_frame::{FeatureSet, FrameUniforms, KnotUniform, QuadratureRule};
 use brickfield_shaders::naga::{Module, TypeInner};
-use brickfield_shaders::{Entry, KnotSearch, Variant, specialise};
+use brickfield_shaders::{Entry, KnotSearch, Segments, Variant, specialise};
 
 macro_rules! host {
     ($t:ty, $($member:ident),*) => { (vec![$((stringify!($member), offset_of!($t, $member))),*], size_of::<$t>()) };
@@ -28,6 +28,7 @@ fn host_and_shader_structs_have_the_same_layout() {
     let variant = Variant {
         features: FeatureSet::all(),
         rule: QuadratureRule::MidpointExponential,
+        segments: Segments::default(),
         search: KnotSearch::Unrolled(2),
         long_rays: false,
         integer_samples: false,
@@ -36,6 +37,7 @@ fn host_and_shader_structs_have_the_same_layout() {
     let module = specialise(&variant).unwrap().module;
     #[rustfmt::skip]
     assert_equal(&module, "Frame", host!(FrameUniforms, anchor, anchor_right, anchor_down, direction, direction_right,
-        direction_down, domain_min, domain_max, visible_min, visible_max, origin, last_sample, index_dims, atlas_bricks, size));
+        direction_down, domain_min, domain_max, visible_min, visible_max, origin, last_sample, index_dims, atlas_bricks, size,
+        planes_low, planes_high, voxel_world));
     assert_equal(&module, "Knot", host!(KnotUniform, optics, value));
 }

@@ -1,7 +1,7 @@
 //! Every variant compiles, and holds nothing that it does not need.
 
-use brickfield_frame::{Feature, FeatureSet, QuadratureRule, ShaderFunction};
-use brickfield_shaders::{BindingKind, Entry, KnotSearch, Specialised, Variant, specialise};
+use brickfield_frame::{Feature, FeatureSet, Lengths, QuadratureRule, ShaderFunction};
+use brickfield_shaders::{BindingKind, Entry, KnotSearch, Segments, Specialised, Surfaces, Variant, specialise};
 
 const SEARCH: KnotSearch = KnotSearch::Unrolled(2);
 
@@ -12,7 +12,7 @@ fn feature_sets() -> impl Iterator<Item = FeatureSet> {
 
 /// A variant for short rays through samples that are no 16-bit integers.
 fn variant(features: FeatureSet, rule: QuadratureRule, entry: Entry) -> Variant {
-    Variant { features, rule, search: SEARCH, long_rays: false, integer_samples: false, entry }
+    Variant { features, rule, segments: Segments::default(), search: SEARCH, long_rays: false, integer_samples: false, entry }
 }
 
 fn compile(variant: &Variant) -> Specialised {
@@ -37,6 +37,26 @@ fn every_variant_of_the_march_compiles() {
                 assert!(shader.spirv().unwrap().len() > 100);
                 assert_eq!(shader.workgroup_size, [8, 8, 1]);
                 assert_eq!(indices(&shader).contains(&8), long_rays);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_kind_of_segments_compiles() {
+    // With every feature, none, and all but one.
+    let all = FeatureSet::all();
+    let sets = Feature::ALL.map(|f| all.without(f)).into_iter().chain([all, FeatureSet::default()]);
+    for features in sets {
+        for (segments, rule) in Segments::all().flat_map(|s| QuadratureRule::ALL.map(|rule| (s, rule))) {
+            if segments.lengths == Lengths::Nominal && rule != QuadratureRule::MidpointExponential {
+                continue;
+            }
+            for long_rays in [false, true] {
+                let variant = Variant { segments, long_rays, ..variant(features, rule, Entry::March) };
+                let shader = compile(&variant);
+                assert_eq!(indices(&shader).contains(&12), segments.surfaces == Surfaces::TessellatedShells);
+                assert!(shader.spirv().unwrap().len() > 100);
             }
         }
     }

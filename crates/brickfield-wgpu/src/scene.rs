@@ -19,6 +19,7 @@ pub(crate) struct Scene {
     /// And the map that is in it.
     occupancy: (Reused, Held<Occupancy>),
     beams: Reused,
+    facets: Reused,
     pub(crate) inputs: Reused,
     pub(crate) results: Reused,
     sampler: wgpu::Sampler,
@@ -37,6 +38,7 @@ impl Scene {
             seen_before: Reused::new("rays between passes", storage),
             occupancy: (Reused::new("the occupancy of bricks", storage), Held::nothing()),
             beams: Reused::new("the beams", storage),
+            facets: Reused::new("the facets", storage),
             inputs: Reused::new("the inputs", storage),
             results: Reused::new("the results", BufferUsages::STORAGE | BufferUsages::COPY_SRC),
             sampler: device.device.create_sampler(&wgpu::SamplerDescriptor {
@@ -78,6 +80,9 @@ impl Scene {
         if pipeline.binds(10) {
             let beams = plan.beams.as_ref().ok_or_else(unbound)?;
             self.beams.write(device, bytemuck::cast_slice(&beams.spans()))?;
+        }
+        if pipeline.binds(12) {
+            self.facets.write(device, bytemuck::cast_slice(&plan.rays.facet_planes()))?;
         }
         Ok(uniforms)
     }
@@ -125,6 +130,7 @@ impl Scene {
             8 => self.seen_before.binding(),
             9 => self.occupancy.0.binding(),
             10 => self.beams.binding(),
+            12 => self.facets.binding(),
             _ => None,
         }
     }

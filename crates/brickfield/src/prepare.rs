@@ -6,7 +6,7 @@ use brickfield_bricks::BrickTree;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BrickId, Level, ValueRange};
 use brickfield_frame::{
-    Beams, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, RayFrame, Sampling, SamplingError,
+    Beams, Division, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, RayFrame, Sampling, SamplingError, Steps,
 };
 use brickfield_lod::{Culling, Selection, View, select_cut};
 use brickfield_optics::QuadratureRule;
@@ -62,10 +62,13 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
         return Err(PrepareError::Step { step_voxels: scene.step_voxels });
     }
     let sampling = Sampling::new(step_world, scene.rule, scene.mode)?;
+    let sampling = sampling.placed(scene.placement)?.divided(scene.division).weighted(scene.lengths)?;
     check_segments(grid.world_box().diagonal() / step_world)?;
-    let rays = RayFrame::new(&scene.camera, grid, scene.size, &volume_box(tree), step_world);
-    check_segments(rays.n_segments)?;
     let selection = select_cut(tree.layout(), grid, &view(scene), &scene.detail);
+    let coarsest = selection.drawn().map(|id| id.level).max().unwrap_or(Level(0));
+    let steps = Steps::of(&sampling, coarsest);
+    let rays = RayFrame::new(&scene.camera, grid, scene.size, &volume_box(tree), &steps);
+    check_segments(rays.n_segments)?;
     let resident = resident_bricks(tree, scene, &selection, &domain);
     if resident.len() >= IndexEntry::MAX_SLOTS as usize {
         return Err(PrepareError::TooManyBricks { n_bricks: resident.len(), limit: IndexEntry::MAX_SLOTS });
@@ -159,8 +162,8 @@ fn resident_bricks(tree: &BrickTree, scene: &Scene, selection: &Selection, domai
     if scene.skipping == Skipping::Off {
         return selection.cut().bricks().to_vec();
     }
-    let reach = match scene.rule {
-        QuadratureRule::PreIntegrated => segment_reach(tree, scene),
+    let reach = match (scene.rule, scene.division) {
+        (QuadratureRule::PreIntegrated, Division::Ray) => segment_reach(tree, scene),
         _ => 0,
     };
     let visibility = Visibility::of(tree, &scene.transfer, selection.cut().bricks(), reach);

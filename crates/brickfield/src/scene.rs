@@ -2,7 +2,7 @@
 
 use brickfield_core::glam::UVec2;
 use brickfield_core::{Aabb, Camera, TransferFunction};
-use brickfield_frame::Mode;
+use brickfield_frame::{Division, Lengths, Mode, Placement};
 use brickfield_lod::Criterion;
 use brickfield_optics::QuadratureRule;
 
@@ -21,6 +21,12 @@ pub struct Scene {
     pub rule: QuadratureRule,
     /// Exact or fast.
     pub mode: Mode,
+    /// Between which surfaces segments lie.
+    pub placement: Placement,
+    /// What is divided into segments: rays, or their way through each brick by its level's steps.
+    pub division: Division,
+    /// For which length the light through a sample is computed.
+    pub lengths: Lengths,
     /// Which resolution each part is drawn from.
     pub detail: Criterion,
     /// The part of the volume that is shown, in index space; `None` is all of it.
@@ -40,7 +46,7 @@ pub enum Skipping {
 }
 
 impl Scene {
-    /// A scene with the defaults: midpoint rule, exact mode, half a voxel a step, full resolution, no clipping, skipping.
+    /// A scene with the defaults: midpoint rule, exact mode, shells of whole rays, half a voxel a step, full resolution, no clipping, skipping.
     pub fn new(camera: Camera, size: UVec2, transfer: TransferFunction) -> Scene {
         Scene {
             camera,
@@ -49,6 +55,9 @@ impl Scene {
             step_voxels: 0.5,
             rule: QuadratureRule::MidpointExponential,
             mode: Mode::Exact,
+            placement: Placement::Shells,
+            division: Division::Ray,
+            lengths: Lengths::True,
             detail: Criterion::FullResolution,
             clip: None,
             skipping: Skipping::On,

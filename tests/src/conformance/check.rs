@@ -132,7 +132,7 @@ fn check_oracle(subject: &Subject, reference: &Discrete) -> Result<(), Complaint
     };
     // f32 samples carry a field that is linear only to f32.
     let bound = if matches!(subject.oracle, Oracle::EveryLevel(_)) { 3e-6 } else { stored_rounding(subject) };
-    let own = naive(volume, &subject.scene);
+    let own = naive(volume, subject.tree.layout().side(), &subject.scene);
     let of_pixel = |(a, b): (&[f64; 4], &[f64; 4])| (0..4).map(|c| (a[c] - b[c]).abs()).fold(0.0, f64::max);
     let differences = own.pixels().iter().zip(reference.image.pixels()).map(of_pixel);
     let beyond = differences.zip(&reference.ambiguity).enumerate().find(|(_, (d, a))| is_beyond(*d, bound + **a));

@@ -18,7 +18,6 @@ use brickfield_core::{Aabb, Ray, TransferFunction};
 use brickfield_optics::{Segment, transmittance};
 use rayon::prelude::*;
 
-use super::naive::pieces;
 use super::samples::{PlanSamples, Samples};
 
 /// Rounding of an 8-bit filter: three steps, half a code each.
@@ -31,7 +30,8 @@ struct Node {
     stray: f64,
 }
 
-/// The most that filtering with weights of `bits` bits may change any channel of each pixel, rows from the top.
+/// The most that filtering with weights of `bits` bits may change any channel of each pixel, rows from the top; for segments of
+/// whole rays with their true lengths.
 pub(crate) fn filter_bound(plan: &FramePlan, bits: u32) -> Vec<f64> {
     let size = plan.size();
     let pixel = |i: u32| of_ray(plan, bits, &plan.rays.ray(i % size.x, i / size.x));
@@ -39,14 +39,19 @@ pub(crate) fn filter_bound(plan: &FramePlan, bits: u32) -> Vec<f64> {
 }
 
 fn of_ray(plan: &FramePlan, bits: u32, ray: &PlanRay) -> f64 {
-    let origin = plan.rays.center + ray.anchor - ray.direction * (ray.t_anchor + plan.rays.start);
-    let ray = Ray { origin, direction: ray.direction };
-    let Some(span) = ray.clip(&grown(&plan.domain)) else { return 0.0 };
+    let eye = plan.rays.center + ray.anchor - ray.direction * (ray.t_anchor - ray.t_eye);
+    let from_eye = Ray { origin: eye, direction: ray.direction };
+    let Some(span) = from_eye.clip(&grown(&plan.domain)) else { return 0.0 };
     let (mut bound, mut least_depth) = (0.0, 0.0);
-    for piece in pieces(span, plan.sampling.step_world()) {
-        let node = |x: &f64| node_at(plan, bits, ray.at(piece.at(*x)));
+    let step = plan.sampling.step_world() * ray.stretch;
+    // Surface 0 is a parameter -t_eye from the eye.
+    let (first, last) = (((span.start + ray.t_eye) / step).floor(), ((span.end + ray.t_eye) / step).ceil());
+    for k in (0..(last - first) as u64).map(|i| first + i as f64) {
+        let surface = |k: f64| (k * step - ray.t_eye).clamp(span.start, span.end);
+        let (start, length) = (surface(k), surface(k + 1.0) - surface(k));
+        let node = |x: &f64| node_at(plan, bits, from_eye.at(start + length * x));
         let nodes: Vec<Option<Node>> = plan.sampling.rule().nodes().iter().map(node).collect();
-        let (change, least) = spread(plan, &nodes, piece.length());
+        let (change, least) = spread(plan, &nodes, length);
         bound += transmittance(least_depth) * change;
         least_depth += least;
     }

@@ -20,6 +20,7 @@ mod run;
 mod samples;
 mod self_check;
 pub mod shader_mutants;
+mod surfaces;
 
 pub use case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, Plans, Point, Shows, Subject};
 pub use cases::all as cases;

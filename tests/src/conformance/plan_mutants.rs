@@ -249,7 +249,10 @@ fn show_ghosts(plan: &mut FramePlan) {
 
 fn resample(plan: &mut FramePlan, change: impl Fn(&Sampling) -> (f64, QuadratureRule, Mode)) {
     let (step, rule, mode) = change(&plan.sampling);
-    plan.sampling = Sampling::new(step, rule, mode).expect("a mutant's sampling is a sampling");
+    let old = plan.sampling;
+    let new = Sampling::new(step, rule, mode).expect("a mutant's sampling is a sampling");
+    let new = new.placed(old.placement()).expect("it was placed so").divided(old.division());
+    plan.sampling = new.weighted(old.lengths()).unwrap_or(new);
 }
 
 fn end_domain_at_samples(plan: &mut FramePlan) {

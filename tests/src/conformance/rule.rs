@@ -9,7 +9,7 @@
 //! A tolerance so wide that the picture could be anything is no test: see [`Tolerance::is_empty_promise`].
 
 use brickfield::cpu::Discrete;
-use brickfield::frame::{Capabilities, FramePlan, Mode};
+use brickfield::frame::{Capabilities, Division, FramePlan, Lengths, Mode};
 use brickfield_core::glam::UVec2;
 use brickfield_core::{Image, TransferFunction};
 
@@ -62,6 +62,8 @@ pub enum Complaint {
     NotComparable(#[from] MetricError),
     #[error("rays of {n_samples} samples: the rules end at {MOST_SAMPLES}")]
     NoRule { n_samples: u64 },
+    #[error("fast mode has a rule for segments of whole rays with their true lengths only")]
+    NoFastRule,
     #[error("a quarter of the pixels may differ by more than {bound:.2}: the tolerance promises nothing")]
     EmptyPromise { bound: f64 },
     #[error("the picture shows {found}, but the case says {stated}")]
@@ -81,6 +83,9 @@ impl Tolerance {
         let Mode::Fast { transmittance_floor } = plan.sampling.mode() else {
             return Ok(Tolerance { most: exact(most), bulk: exact(BULK_BOUND) });
         };
+        if plan.sampling.division() == Division::Brick || plan.sampling.lengths() == Lengths::Nominal {
+            return Err(Complaint::NoFastRule);
+        }
         let filter = filter_bound(plan, device.sub_texel_bits);
         let ends = |i: usize| {
             let transmittance = 1.0 - reference.image.pixels()[i][3];
@@ -168,10 +173,12 @@ fn longest_ray(plan: &FramePlan) -> u64 {
     let samples = |i: u32| {
         let ray = ray(i);
         let far = brickfield_core::Ray {
-            origin: plan.rays.center + ray.anchor - ray.direction * (ray.t_anchor + plan.rays.start),
+            origin: plan.rays.center + ray.anchor - ray.direction * (ray.t_anchor - ray.t_eye),
             direction: ray.direction,
         };
-        far.clip(&plan.domain).map_or(0.0, |s| (s.end - s.start) / plan.sampling.step_world())
+        let n_cuts = f64::from(plan.index.dims().element_sum());
+        let more = if plan.sampling.division() == Division::Brick { n_cuts } else { 0.0 };
+        far.clip(&plan.domain).map_or(0.0, |s| (s.end - s.start) / (plan.sampling.step_world() * ray.stretch) + more)
     };
     let most = (0..size.x * size.y).map(samples).fold(0.0, f64::max);
     most.ceil() as u64 * plan.sampling.rule().nodes().len() as u64

@@ -87,25 +87,27 @@ mutants! {
     /// The phase of the shells is that of a plane.
     FLAT_SHELLS: "flat-shells", "rays", "frame.anchor_down.w * (square / (1.0 + length))" => "0.0";
     /// The first segment is not shortened.
-    FIRST_NOT_CUT: "first-not-cut", "march", "select(boundary(ray, k), walk.span.start, k == walk.first)"
+    FIRST_NOT_CUT: "first-not-cut", "segments", "select(boundary(ray, k), walk.span.start, k == walk.first)"
         => "boundary(ray, k)";
     /// The last segment is not shortened.
-    LAST_NOT_CUT: "last-not-cut", "march", "select(boundary(ray, k + 1.0), walk.span.end, k == walk.last)"
+    LAST_NOT_CUT: "last-not-cut", "segments", "select(boundary(ray, k + 1.0), walk.span.end, k == walk.last)"
         => "boundary(ray, k + 1.0)";
     /// The first segment is dropped.
-    FIRST_DROPPED: "first-dropped", "march", "walk.first = floor(" => "walk.first = ceil(";
+    FIRST_DROPPED: "first-dropped", "segments", "walk.first = floor(" => "walk.first = ceil(";
     /// The last segment is dropped.
-    LAST_DROPPED: "last-dropped", "march", "walk.last = ceil(segments_before(ray, walk.span.end)) - 1.0;"
+    LAST_DROPPED: "last-dropped", "segments", "walk.last = ceil(segments_before(ray, walk.span.end)) - 1.0;"
         => "walk.last = ceil(segments_before(ray, walk.span.end)) - 2.0;";
     /// A brick keeps the ray for two segments too many.
-    OVERSTAYS: "overstays", "march", "stop = max(k + 1.0, min(stop, min(walk.end, walk.last)));"
+    OVERSTAYS: "overstays", "segments", "stop = max(k + 1.0, min(stop, min(walk.end, walk.last)));"
         => "stop = max(k + 1.0, min(stop + 2.0, min(walk.end, walk.last)));";
     /// A jump over a transparent block goes 24 segments too far: two reach only the dark rim of what follows.
     JUMPS_TOO_FAR: "jumps-too-far", "march", "k = block_stop;" => "k = block_stop + 24.0;";
     /// A leap over dark macrocells goes 8 segments too far.
-    LEAPS_TOO_FAR: "leaps-too-far", "march", "k = end;" => "k = end + 8.0;";
+    LEAPS_TOO_FAR: "leaps-too-far", "march", "  k = end;" => "  k = end + 8.0;";
+    /// The same, in bricks with segments of their own.
+    LEAPS_TOO_FAR_IN_BRICK: "leaps-too-far-in-brick", "march", "walk.k = end;" => "walk.k = end + 8.0;";
     /// Of segments with two nodes, the far one may lie anywhere.
-    FAR_NODE_FORGOTTEN: "far-node-forgotten", "march", "stop = select(k, stop, own);" => "";
+    FAR_NODE_FORGOTTEN: "far-node-forgotten", "segments", "stop = select(k, stop, own);" => "";
     /// Macrocells are taken for those of the next row.
     MACROCELL_ROW: "macrocell-row", "bricks", "at.x + n * (at.y + n * (at.z + n * block.slot))"
         => "at.y + n * (at.x + n * (at.z + n * block.slot))";
@@ -124,6 +126,21 @@ mutants! {
         => "(textureLoad(atlas, i, 0).x - frame.last_sample.w / 65535.0) * 65535.0";
     /// Rays end at a transmittance of 1/5.
     ENDS_EARLY: "ends-early", "march", "exp(-seen.w) < frame.direction_down.w" => "exp(-seen.w) < 0.2";
+    /// Bricks have the steps of level 0, whatever their level.
+    STEPS_OF_LEVEL_0: "steps-of-level-0", "segments", "own.step *= coarseness;" => "";
+    /// A brick's segments go on to the end of the ray.
+    BRICK_NOT_LEFT: "brick-not-left", "march", "span.end = min(exit, visible.end);" => "span.end = visible.end;";
+    /// Nominal lengths have the angle's stretch.
+    NOMINAL_STRETCHED: "nominal-stretched", "segments",
+        "fn nominal_length(ray: Ray) -> f32 {\n    return frame.direction_right.w;" => "fn nominal_length(ray: Ray) -> f32 {\n    return ray.step;";
+    /// Planes parallel to the picture are as far apart on every ray.
+    PLANES_NOT_STRETCHED: "planes-not-stretched", "rays", "ray.step = frame.direction_right.w * length;"
+        => "ray.step = frame.direction_right.w;";
+    /// Facets are those of the neighbouring square.
+    FACET_BESIDE: "facet-beside", "rays", "return 2u * (square.x + square.y" => "return 2u * (square.x + 1u + square.y";
+    /// Rays take the least steep stack of planes.
+    STACK_FLAT: "stack-flat", "rays", "let axis = select(select(2u, 1u, steep.y >= steep.z), 0u, steep.x >= steep.y && steep.x >= steep.z);"
+        => "let axis = select(select(2u, 1u, steep.y < steep.z), 0u, steep.x < steep.y && steep.x < steep.z);";
     /// Opacity is the depth.
     OPACITY_IS_DEPTH: "opacity-is-depth", "march", "vec4f(seen.rgb, alpha(seen.w))" => "vec4f(seen.rgb, min(seen.w, 1.0))";
 }

@@ -6,6 +6,7 @@ mod fields;
 mod functions;
 mod levels;
 mod pictures;
+mod placements;
 mod real;
 mod setup;
 mod views;
@@ -19,6 +20,7 @@ pub fn all() -> Vec<Case> {
         pictures::cases(),
         views::cases(),
         levels::cases(),
+        placements::cases(),
         fast::cases(),
         extremes::cases(),
         real::cases(),
