@@ -5,7 +5,7 @@ use std::sync::Arc;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, TransferFunction};
 
-use crate::{Beams, BrickSet, Feature, FeatureSet, IndexGrid, Occupancy, RayFrame, SampleFormat, Sampling, ValueScale};
+use crate::{Beams, BrickSet, Feature, FeatureSet, IndexGrid, Occupancy, ProxyGeometry, RayFrame, SampleFormat, Sampling, ValueScale};
 
 /// Everything that a backend needs for one frame, and nothing that this frame does not need.
 #[derive(Clone, Debug)]
@@ -30,6 +30,9 @@ pub struct FramePlan {
     pub occupancy: Option<Arc<Occupancy>>,
     /// Where the rays of each tile may see something; `None` where each finds its own way.
     pub beams: Option<Arc<Beams>>,
+    /// The polygons on which the samples are rasterised; `None` where rays are cast. Backends without a rasteriser cast rays to
+    /// the same samples.
+    pub proxy: Option<Arc<ProxyGeometry>>,
     /// What the frame needs of a shader.
     pub features: FeatureSet,
 }

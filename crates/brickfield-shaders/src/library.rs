@@ -4,9 +4,9 @@ use std::borrow::Cow;
 
 use wesl::{CompileOptions, Features, ManglerKind, ModulePath, VirtualResolver, Wesl};
 
-use crate::{Entry, ShaderError, Variant};
+use crate::{ShaderError, Variant};
 
-const EMBEDDED: [(&str, &str); 10] = [
+const EMBEDDED: [(&str, &str); 11] = [
     ("frame", include_str!("wesl/frame.wesl")),
     ("scalar", include_str!("wesl/scalar.wesl")),
     ("transfer", include_str!("wesl/transfer.wesl")),
@@ -16,6 +16,7 @@ const EMBEDDED: [(&str, &str); 10] = [
     ("preintegrated", include_str!("wesl/preintegrated.wesl")),
     ("segments", include_str!("wesl/segments.wesl")),
     ("march", include_str!("wesl/march.wesl")),
+    ("proxy", include_str!("wesl/proxy.wesl")),
     ("evaluate", include_str!("wesl/evaluate.wesl")),
 ];
 
@@ -84,7 +85,7 @@ impl ShaderLibrary {
         }
         let mut compiler = Wesl::new_barebones().set_custom_resolver(resolver);
         compiler.set_options(options(variant)).set_mangler(ManglerKind::None).use_sourcemap(true);
-        let compiled = compiler.compile(&path(variant.entry.entry_point())?).map_err(ShaderError::compile)?;
+        let compiled = compiler.compile(&path(variant.entry.module())?).map_err(ShaderError::compile)?;
         Ok(compiled.to_string())
     }
 }
@@ -101,7 +102,7 @@ fn options(variant: &Variant) -> CompileOptions {
         strip: true,
         lazy: true,
         features: Features { default: wesl::Feature::Error, flags },
-        keep: Some(vec![Entry::entry_point(variant.entry).to_owned()]),
+        keep: Some(variant.entry.entry_points().iter().map(|name| (*name).to_owned()).collect()),
         ..CompileOptions::default()
     }
 }

@@ -5,7 +5,7 @@ use naga::compact::{KeepUnused, compact};
 use naga::front::wgsl;
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use naga::{Module, ShaderStage};
+use naga::Module;
 
 use crate::reflect::{Binding, bindings};
 use crate::{ShaderLibrary, Variant};
@@ -23,7 +23,7 @@ pub struct Specialised {
     pub wgsl: String,
     /// What is to be bound in group 0, ascending.
     pub bindings: Vec<Binding>,
-    /// Invocations along x, y, z of a workgroup.
+    /// Invocations along x, y, z of a workgroup; 0 where polygons are shaded.
     pub workgroup_size: [u32; 3],
     /// How much code is left.
     pub counts: Counts,
@@ -95,21 +95,14 @@ impl ShaderLibrary {
 }
 
 impl Specialised {
-    /// The entry point's name.
-    pub fn entry_point(&self) -> &'static str {
-        self.variant.entry.entry_point()
-    }
-
-    /// The module as SPIR-V 1.3 for Vulkan.
+    /// The module as SPIR-V 1.3 for Vulkan, with all its entry points.
     ///
     /// Reads are restricted to their resource (at most 15 % of the time on lavapipe, mostly nothing), as wgpu does.
     ///
     /// # Errors
     /// If naga cannot express the module.
     pub fn spirv(&self) -> Result<Vec<u32>, ShaderError> {
-        let pipeline =
-            spv::PipelineOptions { shader_stage: ShaderStage::Compute, entry_point: self.entry_point().into() };
-        spv::write_vec(&self.module, &self.info, &spirv_options(), Some(&pipeline))
+        spv::write_vec(&self.module, &self.info, &spirv_options(), None)
             .map_err(|e| ShaderError::Spirv { message: e.to_string() })
     }
 }

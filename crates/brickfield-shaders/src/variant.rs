@@ -139,22 +139,34 @@ impl KnotSearch {
 /// What a shader does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Entry {
-    /// Renders the picture.
+    /// Renders the picture by casting rays.
     March,
+    /// Renders the picture by shading the polygons of proxy geometry: a vertex and a fragment shader.
+    Proxy,
     /// Evaluates one function on a list of inputs.
     Evaluate(ShaderFunction),
 }
 
 impl Entry {
-    /// Both kinds of entries, the second for each function.
+    /// All kinds of entries, the last for each function.
     pub fn all() -> impl Iterator<Item = Entry> {
-        std::iter::once(Entry::March).chain(ShaderFunction::ALL.into_iter().map(Entry::Evaluate))
+        [Entry::March, Entry::Proxy].into_iter().chain(ShaderFunction::ALL.into_iter().map(Entry::Evaluate))
     }
 
-    /// The entry point's name.
-    pub const fn entry_point(self) -> &'static str {
+    /// The names of the entry points: one for compute, or one for vertices and one for fragments.
+    pub const fn entry_points(self) -> &'static [&'static str] {
+        match self {
+            Entry::March => &["march"],
+            Entry::Proxy => &["project", "shade"],
+            Entry::Evaluate(_) => &["evaluate"],
+        }
+    }
+
+    /// The module that they are in.
+    pub(crate) const fn module(self) -> &'static str {
         match self {
             Entry::March => "march",
+            Entry::Proxy => "proxy",
             Entry::Evaluate(_) => "evaluate",
         }
     }

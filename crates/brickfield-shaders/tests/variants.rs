@@ -1,6 +1,6 @@
 //! Every variant compiles, and holds nothing that it does not need.
 
-use brickfield_frame::{Feature, FeatureSet, Lengths, QuadratureRule, ShaderFunction};
+use brickfield_frame::{Division, Feature, FeatureSet, Lengths, QuadratureRule, ShaderFunction};
 use brickfield_shaders::{BindingKind, Entry, KnotSearch, Segments, Specialised, Surfaces, Variant, specialise};
 
 const SEARCH: KnotSearch = KnotSearch::Unrolled(2);
@@ -58,6 +58,24 @@ fn every_kind_of_segments_compiles() {
                 assert_eq!(indices(&shader).contains(&12), segments.surfaces == Surfaces::TessellatedShells);
                 assert!(shader.spirv().unwrap().len() > 100);
             }
+        }
+    }
+}
+
+#[test]
+fn every_kind_of_polygons_compiles() {
+    let all = FeatureSet::all();
+    for features in Feature::ALL.map(|f| all.without(f)).into_iter().chain([all, FeatureSet::default()]) {
+        for (segments, rule) in Segments::all().flat_map(|s| QuadratureRule::ALL.map(|rule| (s, rule))) {
+            let is_known = segments.lengths == Lengths::True || rule == QuadratureRule::MidpointExponential;
+            if segments.division == Division::Ray || segments.surfaces == Surfaces::Shells || !is_known {
+                continue;
+            }
+            let shader = compile(&Variant { segments, ..variant(features, rule, Entry::Proxy) });
+            assert_eq!(shader.module.entry_points.len(), 2);
+            assert!(shader.spirv().unwrap().len() > 100);
+            // No march, no index, no picture to store to.
+            assert!([3, 5, 8, 9, 10].iter().all(|index| !indices(&shader).contains(index)), "{:?}", indices(&shader));
         }
     }
 }

@@ -5,7 +5,8 @@ use std::time::Instant;
 use brickfield_core::Image;
 use brickfield_core::glam::UVec2;
 use brickfield_frame::{
-    Backend, Description, Feature, Frame, FramePlan, FrameUniforms, RenderError, ShaderFunction, Timing, check_memory,
+    Backend, Description, Feature, Frame, FramePlan, FrameUniforms, RenderError, ShaderFunction, Target, Timing,
+    check_memory,
 };
 use brickfield_shaders::{Entry, ShaderLibrary, Variant, passes, pixels_per_pass, shader_inputs, shader_outputs};
 use wgpu::{BufferUsages, Features};
@@ -13,8 +14,9 @@ use wgpu::{BufferUsages, Features};
 use crate::buffer::Reused;
 use crate::clock::Clock;
 use crate::device::Device;
-use crate::picture;
-use crate::pipeline::{Pipeline, Pipelines};
+use crate::picture::{self, Maker};
+use crate::polygons::Polygons;
+use crate::pipeline::{Pipeline, Pipelines, Program};
 use crate::scene::{Scene, unbound};
 use crate::{AdapterChoice, OpenError, adapter};
 
@@ -27,6 +29,7 @@ pub struct WgpuBackend {
     pipelines: Pipelines,
     clock: Option<Clock>,
     scene: Scene,
+    polygons: Polygons,
     staging: Reused,
     outputs: Outputs,
 }
@@ -50,6 +53,7 @@ impl WgpuBackend {
             pipelines: Pipelines::default(),
             clock: Clock::new(&device),
             scene: Scene::new(&device),
+            polygons: Polygons::new(),
             staging: picture::staging(),
             outputs: Outputs {
                 staging: Reused::new("reading results back", BufferUsages::MAP_READ | BufferUsages::COPY_DST),
@@ -78,6 +82,10 @@ impl WgpuBackend {
             && plan.bricks.format() == brickfield_frame::SampleFormat::Float32;
         if filtered_floats && !self.device.has(Features::FLOAT32_FILTERABLE) {
             return Err(RenderError::Unsupported { what: "filter 32-bit floats in hardware (FLOAT32_FILTERABLE)" });
+        }
+        let blends_floats = plan.proxy.as_ref().is_some_and(|proxy| proxy.target() == Target::Float32);
+        if blends_floats && !self.device.has(Features::FLOAT32_BLENDABLE) {
+            return Err(RenderError::Unsupported { what: "blend 32-bit floats (FLOAT32_BLENDABLE): take rgba16float" });
         }
         Ok(())
     }
@@ -129,13 +137,23 @@ impl Backend for WgpuBackend {
         }
         self.check_features(plan)?;
         let started = Instant::now();
-        let pipeline = self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?;
+        let maker = plan.proxy.as_ref().map_or(Maker::Rays, |proxy| Maker::Polygons(proxy.target()));
+        let pipeline = match maker {
+            Maker::Rays => self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?,
+            Maker::Polygons(target) => self.pipelines.blending_into(&self.device, Variant::of(plan, Entry::Proxy), target)?,
+        };
         let uniforms = self.scene.update(&self.device, plan, pipeline)?;
-        self.scene.resize(&self.device, size)?;
+        self.scene.resize(&self.device, size, maker)?;
+        if let Some(proxy) = &plan.proxy {
+            self.polygons.hold(&self.device, proxy)?;
+        }
         self.device.queue.submit([]);
         self.device.wait("uploading")?;
         let upload_ms = milliseconds(started);
-        let (device_ms, wall_ms) = self.march(plan, uniforms)?;
+        let (device_ms, wall_ms) = match &plan.proxy {
+            None => self.march(plan, uniforms)?,
+            Some(proxy) => self.polygons.draw(&self.device, pipeline, &self.scene, proxy, self.clock.as_ref())?,
+        };
         let started = Instant::now();
         let Some(picture) = &self.scene.picture else { return Err(unbound()) };
         let image = picture.read(&self.device, &mut self.staging)?;
@@ -185,13 +203,14 @@ fn dispatch(
     clock: Option<&Clock>,
 ) -> Result<(), RenderError> {
     let bound = scene.bind(device, pipeline)?;
+    let Program::Compute(program) = &pipeline.program else { return Err(unbound()) };
     device.checked("running a shader", 0, || {
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("brickfield"),
             timestamp_writes: clock.map(Clock::writes),
         });
-        pass.set_pipeline(&pipeline.pipeline);
+        pass.set_pipeline(program);
         pass.set_bind_group(0, &bound, &[]);
         pass.dispatch_workgroups(groups[0], groups[1], groups[2]);
         drop(pass);
@@ -202,6 +221,6 @@ fn dispatch(
     })
 }
 
-fn milliseconds(since: Instant) -> f64 {
+pub(crate) fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }

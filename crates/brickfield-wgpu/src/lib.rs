@@ -8,6 +8,7 @@ mod clock;
 mod device;
 mod picture;
 mod pipeline;
+mod polygons;
 mod scene;
 
 pub use adapter::{AdapterChoice, AdapterSummary, OpenError, adapters};

@@ -2,26 +2,56 @@
 
 use brickfield_core::Image;
 use brickfield_core::glam::UVec2;
-use brickfield_frame::RenderError;
+use brickfield_frame::{RenderError, Target};
 use wgpu::BufferUsages;
 
 use crate::buffer::Reused;
 use crate::device::Device;
 
-/// The picture's texels.
-pub(crate) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
-const PIXEL_BYTES: u32 = 16;
+/// What a picture is made by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Maker {
+    /// A shader that stores its pixels.
+    Rays,
+    /// Polygons that are blended into it.
+    Polygons(Target),
+}
 
 /// A picture of some size.
 pub(crate) struct Picture {
     size: UVec2,
+    maker: Maker,
     texture: wgpu::Texture,
     pub(crate) view: wgpu::TextureView,
 }
 
+impl Maker {
+    fn target(self) -> Target {
+        match self {
+            Maker::Rays => Target::Float32,
+            Maker::Polygons(target) => target,
+        }
+    }
+
+    fn usage(self) -> wgpu::TextureUsages {
+        match self {
+            Maker::Rays => wgpu::TextureUsages::STORAGE_BINDING,
+            Maker::Polygons(_) => wgpu::TextureUsages::RENDER_ATTACHMENT,
+        }
+    }
+}
+
+/// The texels of a picture.
+pub(crate) fn format(target: Target) -> wgpu::TextureFormat {
+    match target {
+        Target::Float32 => wgpu::TextureFormat::Rgba32Float,
+        Target::Float16 => wgpu::TextureFormat::Rgba16Float,
+    }
+}
+
 impl Picture {
-    pub(crate) fn new(device: &Device, size: UVec2) -> Result<Picture, RenderError> {
-        let n_bytes = u64::from(size.x) * u64::from(size.y) * u64::from(PIXEL_BYTES);
+    pub(crate) fn new(device: &Device, size: UVec2, maker: Maker) -> Result<Picture, RenderError> {
+        let n_bytes = u64::from(size.x) * u64::from(size.y) * maker.target().pixel_bytes() as u64;
         device.checked("the picture", n_bytes, || {
             let texture = device.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("picture"),
@@ -29,22 +59,24 @@ impl Picture {
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
-                format: FORMAT,
-                usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_SRC,
+                format: format(maker.target()),
+                usage: maker.usage() | wgpu::TextureUsages::COPY_SRC,
                 view_formats: &[],
             });
             let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-            Picture { size, texture, view }
+            Picture { size, maker, texture, view }
         })
     }
 
-    pub(crate) fn has_size(&self, size: UVec2) -> bool {
-        self.size == size
+    /// Whether it is of this size, for this maker.
+    pub(crate) fn fits(&self, size: UVec2, maker: Maker) -> bool {
+        (self.size, self.maker) == (size, maker)
     }
 
     /// Brings the picture back, through `staging`.
     pub(crate) fn read(&self, device: &Device, staging: &mut Reused) -> Result<Image<f32>, RenderError> {
-        let row_bytes = (self.size.x * PIXEL_BYTES).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let target = self.maker.target();
+        let row_bytes = (self.size.x * target.pixel_bytes() as u32).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let n_bytes = u64::from(row_bytes) * u64::from(self.size.y);
         let buffer = staging.reserve(device, n_bytes)?;
         device.checked("copying the picture", n_bytes, || {
@@ -59,7 +91,7 @@ impl Picture {
             device.queue.submit([encoder.finish()]);
         })?;
         let view = device.read(buffer, n_bytes)?;
-        let image = unpadded(&view, self.size, row_bytes as usize);
+        let image = unpadded(&view, self.size, row_bytes as usize, target);
         drop(view);
         buffer.unmap();
         Ok(image)
@@ -75,11 +107,11 @@ fn extent(size: UVec2) -> wgpu::Extent3d {
     wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 }
 }
 
-fn unpadded(bytes: &[u8], size: UVec2, row_bytes: usize) -> Image<f32> {
+fn unpadded(bytes: &[u8], size: UVec2, row_bytes: usize, target: Target) -> Image<f32> {
     let mut image = Image::transparent(size);
     let width = size.x as usize;
     for (row, from) in image.pixels_mut().chunks_exact_mut(width).zip(bytes.chunks_exact(row_bytes)) {
-        bytemuck::cast_slice_mut(row).copy_from_slice(&from[..width * PIXEL_BYTES as usize]);
+        target.read(from, row);
     }
     image
 }

@@ -3,24 +3,32 @@
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-use brickfield_frame::RenderError;
-use brickfield_shaders::{Binding, BindingKind, ShaderLibrary, Specialised, Variant};
+use brickfield_frame::{ProxyCorner, RenderError, Target};
+use brickfield_shaders::{Binding, BindingKind, Entry, ShaderLibrary, Specialised, Variant};
 
 use crate::device::Device;
+use crate::picture::format;
 
 /// A variant, ready to run.
 pub(crate) struct Pipeline {
-    pub(crate) pipeline: wgpu::ComputePipeline,
+    pub(crate) program: Program,
     pub(crate) layout: wgpu::BindGroupLayout,
     pub(crate) bindings: Vec<Binding>,
     pub(crate) workgroup_size: [u32; 3],
+}
+
+/// What a variant is run as.
+pub(crate) enum Program {
+    Compute(wgpu::ComputePipeline),
+    Polygons(wgpu::RenderPipeline),
 }
 
 /// The pipelines built so far.
 #[derive(Default)]
 pub(crate) struct Pipelines {
     library: ShaderLibrary,
-    built: HashMap<Variant, Pipeline>,
+    /// The target is that of polygons.
+    built: HashMap<(Variant, Target), Pipeline>,
 }
 
 impl Pipelines {
@@ -30,11 +38,22 @@ impl Pipelines {
 
     /// The pipeline of a variant, built if it is new.
     pub(crate) fn of(&mut self, device: &Device, variant: Variant) -> Result<&Pipeline, RenderError> {
-        if !self.built.contains_key(&variant) {
-            let pipeline = build(device, &self.library, &variant)?;
-            self.built.insert(variant, pipeline);
+        self.blending_into(device, variant, Target::default())
+    }
+
+    /// The pipeline of a variant that blends polygons into a target.
+    pub(crate) fn blending_into(
+        &mut self,
+        device: &Device,
+        variant: Variant,
+        target: Target,
+    ) -> Result<&Pipeline, RenderError> {
+        let key = (variant, target);
+        if !self.built.contains_key(&key) {
+            let pipeline = build(device, &self.library, &variant, target)?;
+            self.built.insert(key, pipeline);
         }
-        Ok(&self.built[&variant])
+        Ok(&self.built[&key])
     }
 }
 
@@ -44,39 +63,96 @@ impl Pipeline {
     }
 }
 
-fn build(device: &Device, library: &ShaderLibrary, variant: &Variant) -> Result<Pipeline, RenderError> {
+fn build(
+    device: &Device,
+    library: &ShaderLibrary,
+    variant: &Variant,
+    target: Target,
+) -> Result<Pipeline, RenderError> {
     let shader = library.specialise(variant).map_err(|e| RenderError::Shader { message: e.to_string() })?;
     let n_bytes = shader.wgsl.len() as u64;
-    device.checked("building a shader variant", n_bytes, || from_shader(&device.device, shader))
+    device.checked("building a shader variant", n_bytes, || from_shader(&device.device, shader, target))
 }
 
-fn from_shader(device: &wgpu::Device, shader: Specialised) -> Pipeline {
-    let entry_point = shader.entry_point();
+fn from_shader(device: &wgpu::Device, shader: Specialised, target: Target) -> Pipeline {
+    let entry = shader.variant.entry;
+    let label = entry.entry_points()[0];
     let filtered = shader.bindings.iter().any(|b| b.kind == BindingKind::Sampler);
-    let entries: Vec<_> = shader.bindings.iter().map(|b| entry(b, filtered)).collect();
-    let layout = device
-        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(entry_point), entries: &entries });
+    let entries: Vec<_> = shader.bindings.iter().map(|b| layout_entry(b, entry, filtered)).collect();
+    let layout =
+        device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries });
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(entry_point),
+        label: Some(label),
         bind_group_layouts: &[Some(&layout)],
         immediate_size: 0,
     });
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(entry_point),
+        label: Some(label),
         source: wgpu::ShaderSource::Naga(Cow::Owned(shader.module)),
     });
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+    let program = match entry {
+        Entry::Proxy => Program::Polygons(polygons(device, &pipeline_layout, &module, target)),
+        Entry::March | Entry::Evaluate(_) => Program::Compute(compute(device, &pipeline_layout, &module, label)),
+    };
+    Pipeline { program, layout, bindings: shader.bindings, workgroup_size: shader.workgroup_size }
+}
+
+fn compute(
+    device: &wgpu::Device,
+    layout: &wgpu::PipelineLayout,
+    module: &wgpu::ShaderModule,
+    entry_point: &str,
+) -> wgpu::ComputePipeline {
+    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: Some(entry_point),
-        layout: Some(&pipeline_layout),
-        module: &module,
+        layout: Some(layout),
+        module,
         entry_point: Some(entry_point),
         compilation_options: wgpu::PipelineCompilationOptions::default(),
         cache: None,
-    });
-    Pipeline { pipeline, layout, bindings: shader.bindings, workgroup_size: shader.workgroup_size }
+    })
 }
 
-fn entry(binding: &Binding, filtered: bool) -> wgpu::BindGroupLayoutEntry {
+fn polygons(
+    device: &wgpu::Device,
+    layout: &wgpu::PipelineLayout,
+    module: &wgpu::ShaderModule,
+    target: Target,
+) -> wgpu::RenderPipeline {
+    let [vertex, fragment] = [0, 1].map(|i| Some(Entry::Proxy.entry_points()[i]));
+    let compilation_options = wgpu::PipelineCompilationOptions::default;
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("polygons"),
+        layout: Some(layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: vertex,
+            compilation_options: compilation_options(),
+            buffers: &[Some(wgpu::VertexBufferLayout {
+                array_stride: size_of::<ProxyCorner>() as u64,
+                step_mode: wgpu::VertexStepMode::Vertex,
+                attributes: &wgpu::vertex_attr_array![0 => Float32x2, 1 => Float32, 2 => Uint32, 3 => Uint32],
+            })],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: fragment,
+            compilation_options: compilation_options(),
+            targets: &[Some(wgpu::ColorTargetState {
+                format: format(target),
+                blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+                write_mask: wgpu::ColorWrites::ALL,
+            })],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+fn layout_entry(binding: &Binding, entry: Entry, filtered: bool) -> wgpu::BindGroupLayoutEntry {
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
     let ty = match binding.kind {
@@ -91,9 +167,13 @@ fn entry(binding: &Binding, filtered: bool) -> wgpu::BindGroupLayoutEntry {
         BindingKind::StorageReadWrite => storage(false),
         BindingKind::StorageImage => wgpu::BindingType::StorageTexture {
             access: wgpu::StorageTextureAccess::WriteOnly,
-            format: crate::picture::FORMAT,
+            format: format(Target::Float32),
             view_dimension: wgpu::TextureViewDimension::D2,
         },
     };
-    wgpu::BindGroupLayoutEntry { binding: binding.index, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
+    let visibility = match entry {
+        Entry::Proxy => wgpu::ShaderStages::VERTEX_FRAGMENT,
+        Entry::March | Entry::Evaluate(_) => wgpu::ShaderStages::COMPUTE,
+    };
+    wgpu::BindGroupLayoutEntry { binding: binding.index, visibility, ty, count: None }
 }

@@ -7,7 +7,7 @@ use wgpu::BufferUsages;
 use crate::atlas::{self, Atlas};
 use crate::buffer::Reused;
 use crate::device::Device;
-use crate::picture::Picture;
+use crate::picture::{Maker, Picture};
 use crate::pipeline::Pipeline;
 
 /// What a shader reads and writes.
@@ -20,6 +20,7 @@ pub(crate) struct Scene {
     occupancy: (Reused, Held<Occupancy>),
     beams: Reused,
     facets: Reused,
+    drawn: Reused,
     pub(crate) inputs: Reused,
     pub(crate) results: Reused,
     sampler: wgpu::Sampler,
@@ -39,6 +40,7 @@ impl Scene {
             occupancy: (Reused::new("the occupancy of bricks", storage), Held::nothing()),
             beams: Reused::new("the beams", storage),
             facets: Reused::new("the facets", storage),
+            drawn: Reused::new("the bricks of polygons", storage),
             inputs: Reused::new("the inputs", storage),
             results: Reused::new("the results", BufferUsages::STORAGE | BufferUsages::COPY_SRC),
             sampler: device.device.create_sampler(&wgpu::SamplerDescriptor {
@@ -81,6 +83,10 @@ impl Scene {
             let beams = plan.beams.as_ref().ok_or_else(unbound)?;
             self.beams.write(device, bytemuck::cast_slice(&beams.spans()))?;
         }
+        if pipeline.binds(11) {
+            let proxy = plan.proxy.as_ref().ok_or_else(unbound)?;
+            self.drawn.write(device, bytemuck::cast_slice(proxy.bricks()))?;
+        }
         if pipeline.binds(12) {
             self.facets.write(device, bytemuck::cast_slice(&plan.rays.facet_planes()))?;
         }
@@ -108,10 +114,10 @@ impl Scene {
         Ok(shape)
     }
 
-    pub(crate) fn resize(&mut self, device: &Device, size: UVec2) -> Result<(), RenderError> {
-        if !self.picture.as_ref().is_some_and(|p| p.has_size(size)) {
+    pub(crate) fn resize(&mut self, device: &Device, size: UVec2, maker: Maker) -> Result<(), RenderError> {
+        if !self.picture.as_ref().is_some_and(|p| p.fits(size, maker)) {
             self.picture = None;
-            self.picture = Some(Picture::new(device, size)?);
+            self.picture = Some(Picture::new(device, size, maker)?);
         }
         Ok(())
     }
@@ -130,6 +136,7 @@ impl Scene {
             8 => self.seen_before.binding(),
             9 => self.occupancy.0.binding(),
             10 => self.beams.binding(),
+            11 => self.drawn.binding(),
             12 => self.facets.binding(),
             _ => None,
         }

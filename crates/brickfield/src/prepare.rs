@@ -96,6 +96,7 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
         bricks,
         occupancy,
         beams: None,
+        proxy: None,
         features: FeatureSet::default(),
     };
     plan.beams = overview.and_then(|overview| Beams::of(&plan, &overview)).map(Arc::new);

@@ -74,6 +74,7 @@ pub(crate) fn plan(bricks: BrickSet, transfer: TransferFunction, rule: Quadratur
         bricks: Arc::new(bricks),
         occupancy: None,
         beams: None,
+            proxy: None,
         features,
     }
 }

@@ -98,6 +98,7 @@ impl<'a> Setup<'a> {
                 .flatten(),
             bricks: Arc::new(bricks),
             beams: None,
+            proxy: None,
             features: FeatureSet::all(),
         };
         if self.skip == Skip::Transparent {

@@ -106,6 +106,7 @@ impl Scene {
             transfer: self.transfer.clone(),
             occupancy: None,
             beams: None,
+            proxy: None,
             features: self.features(&index),
             index,
             bricks: Arc::new(BrickSet::new(SIDE, self.format, decode, bytes).unwrap()),

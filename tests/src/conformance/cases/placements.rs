@@ -66,7 +66,7 @@ fn of_bricks() -> Vec<Case> {
     };
     let rule = |rule: QuadratureRule| {
         let name = format!("bricks/skip-{}", rule.name());
-        picture(name, catches![shader::BRICK_NOT_LEFT, VisibleTooSmall], move || {
+        picture(name, catches![shader::BRICK_NOT_LEFT, ExtinctionScaled], move || {
             placed(checkers(UVec3::new(71, 66, 53)), soft(ScalarType::U8), Placement::Shells)
                 .step(0.9)
                 .rule(rule)

@@ -1,0 +1,188 @@
+//! Proxy geometry: the polygons on which a frame's samples are rasterised (LaMar, Hamann and Joy 1999, section 4.2).
+
+mod picture;
+mod polygon;
+mod surfaces;
+
+use std::ops::Range;
+
+use brickfield_core::glam::{DVec2, UVec3};
+use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
+
+use crate::{FramePlan, IndexEntry, Lengths};
+use picture::Projector;
+use polygon::{area, grown};
+use surfaces::{Outline, outlines};
+
+/// The polygons of a frame, brick by brick from back to front, clipped to their bricks and to the picture.
+///
+/// Drawn in this order and blended over each other, they make the picture. A polygon is where a surface of the plan's
+/// [`Placement`](crate::Placement) cuts a brick, and its fragments are the segments that end there; the faces through which rays leave the
+/// brick are polygons, too, of the segments that end with the brick. So every segment of every ray is one fragment. (With
+/// [`Lengths::Nominal`] polygons are the segments' middles, and faces none.)
+///
+/// Polygons are projected, and grown by an eighth of a pixel: which fragments count is decided by the shader from the ray, which
+/// knows exactly; rasterisers round corners to 1/256 of a pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProxyGeometry {
+    target: Target,
+    bricks: Vec<[u32; 4]>,
+    corners: Vec<ProxyCorner>,
+    indices: Vec<u32>,
+    batches: Vec<Range<u32>>,
+    n_polygons: usize,
+}
+
+/// What polygons are blended into.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Target {
+    /// Four floats of 32 bits.
+    #[default]
+    Float32,
+    /// Four floats of 16 bits: half the memory and less precision, about 2^-12 a fragment.
+    Float16,
+}
+
+/// A polygon's corner as shaders read it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct ProxyCorner {
+    /// In pixels from the picture's upper left corner.
+    pub pixel: [f32; 2],
+    /// The number of the surface; [`ProxyCorner::EXIT`] for a face through which rays leave the brick.
+    pub surface: f32,
+    /// Place in [`ProxyGeometry::bricks`].
+    pub brick: u32,
+    /// The facet or stack of planes that the surface belongs to; [`ProxyCorner::ANY`] if rays of all of them may meet it.
+    pub owner: u32,
+}
+
+impl ProxyCorner {
+    /// The surface number of a brick's faces.
+    pub const EXIT: f32 = -1.0;
+    /// The owner of what belongs to none.
+    pub const ANY: u32 = u32::MAX;
+}
+
+impl Target {
+    /// `rgba32float` or `rgba16float`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Target::Float32 => "rgba32float",
+            Target::Float16 => "rgba16float",
+        }
+    }
+
+    /// Bytes of a pixel.
+    pub const fn pixel_bytes(self) -> usize {
+        match self {
+            Target::Float32 => 16,
+            Target::Float16 => 8,
+        }
+    }
+
+    /// The pixels in bytes of this format, as far as there are both.
+    pub fn read(self, bytes: &[u8], pixels: &mut [[f32; 4]]) {
+        let channel = |bytes: &[u8]| match *bytes {
+            [a, b, c, d] => f32::from_le_bytes([a, b, c, d]),
+            [a, b] => half::f16::from_le_bytes([a, b]).to_f32(),
+            _ => f32::NAN,
+        };
+        let channel_bytes = self.pixel_bytes() / 4;
+        for (pixel, bytes) in pixels.iter_mut().zip(bytes.chunks_exact(self.pixel_bytes())) {
+            for (to, from) in pixel.iter_mut().zip(bytes.chunks_exact(channel_bytes)) {
+                *to = channel(from);
+            }
+        }
+    }
+}
+
+/// By how many pixels polygons are grown.
+const GROWN: f64 = 0.125;
+/// Most fragments in a batch, about: what a device does at a time.
+const BATCH_FRAGMENTS: f64 = (1u32 << 24) as f64;
+
+impl ProxyGeometry {
+    /// The polygons of a plan whose resident bricks hold the index cells `back_to_front`, one cell for each brick.
+    ///
+    /// Cost: about 1 us a polygon, over all threads of the current rayon pool.
+    pub fn of(plan: &FramePlan, back_to_front: &[UVec3], target: Target) -> ProxyGeometry {
+        let projector = Projector::new(&plan.rays, plan.sampling.step_world());
+        let of_brick = |cell: &UVec3| outlines(plan, &projector, *cell);
+        let outlines: Vec<Vec<Outline>> = back_to_front.par_iter().map(of_brick).collect();
+        let word = |cell: UVec3| [cell.x, cell.y, cell.z, plan.index.at(cell).pack()];
+        let mut geometry = ProxyGeometry {
+            target,
+            bricks: back_to_front.iter().map(|cell| word(*cell)).collect(),
+            corners: Vec::new(),
+            indices: Vec::new(),
+            batches: Vec::new(),
+            n_polygons: 0,
+        };
+        geometry.fill(&outlines);
+        geometry
+    }
+
+    fn fill(&mut self, outlines: &[Vec<Outline>]) {
+        let (mut batch_start, mut n_fragments) = (0, 0.0);
+        for (brick, outline) in outlines.iter().enumerate().flat_map(|(i, of)| of.iter().map(move |o| (i, o))) {
+            n_fragments += self.push(brick as u32, outline);
+            if n_fragments >= BATCH_FRAGMENTS {
+                self.batches.push(batch_start..self.indices.len() as u32);
+                (batch_start, n_fragments) = (self.indices.len() as u32, 0.0);
+            }
+        }
+        if batch_start < self.indices.len() as u32 {
+            self.batches.push(batch_start..self.indices.len() as u32);
+        }
+    }
+
+    /// Adds a polygon as a fan of triangles; its area in pixels.
+    fn push(&mut self, brick: u32, outline: &Outline) -> f64 {
+        let polygon: Vec<DVec2> = grown(&outline.points, GROWN);
+        let first = self.corners.len() as u32;
+        let Outline { surface, owner, .. } = *outline;
+        let corner = |p: &DVec2| ProxyCorner { pixel: p.as_vec2().to_array(), surface, brick, owner };
+        self.corners.extend(polygon.iter().map(corner));
+        let n = polygon.len() as u32;
+        self.indices.extend((1..n.saturating_sub(1)).flat_map(|i| [first, first + i, first + i + 1]));
+        self.n_polygons += 1;
+        area(&polygon)
+    }
+
+    /// What the polygons are blended into.
+    pub fn target(&self) -> Target {
+        self.target
+    }
+
+    /// The bricks from back to front: an index cell, and its word of the index.
+    pub fn bricks(&self) -> &[[u32; 4]] {
+        &self.bricks
+    }
+
+    /// The polygons' corners.
+    pub fn corners(&self) -> &[ProxyCorner] {
+        &self.corners
+    }
+
+    /// Triangles: three corners each, in drawing order.
+    pub fn indices(&self) -> &[u32] {
+        &self.indices
+    }
+
+    /// Ranges of [`indices`](Self::indices), to be drawn one after the other so that no draw lasts long enough for a driver to end it.
+    pub fn batches(&self) -> &[Range<u32>] {
+        &self.batches
+    }
+
+    /// Number of polygons.
+    pub fn n_polygons(&self) -> usize {
+        self.n_polygons
+    }
+
+    /// Bytes of bricks, corners and indices.
+    pub fn n_bytes(&self) -> usize {
+        size_of_val(&self.bricks[..]) + size_of_val(&self.corners[..]) + size_of_val(&self.indices[..])
+    }
+}

@@ -1,0 +1,214 @@
+//! The polygons of one brick.
+
+use brickfield_core::Aabb;
+use brickfield_core::glam::{DVec2, DVec3, UVec3};
+
+use super::picture::Projector;
+use super::polygon::{Plane, clip, face, slice};
+use super::{IndexEntry, Lengths, ProxyCorner};
+use crate::{FramePlan, Placement};
+
+/// A polygon in the picture, not grown yet.
+pub(super) struct Outline {
+    pub(super) points: Vec<DVec2>,
+    pub(super) surface: f32,
+    pub(super) owner: u32,
+}
+
+/// Planes gradient . p + offset = k step: surface k, in the order in which a ray meets them.
+struct Stack {
+    gradient: DVec3,
+    offset: f64,
+    owner: u32,
+    /// The part of the picture, or of space, whose rays meet these planes.
+    part: Part,
+}
+
+enum Part {
+    All,
+    /// A triangle of the picture.
+    Facet([DVec2; 3]),
+    /// The pyramid around an axis, from the eye.
+    Pyramid { axis: usize, eye: DVec3 },
+}
+
+/// Pyramids are wider than need be by this share: shaders decide, to which one belongs a ray.
+const PYRAMID_MARGIN: f64 = 1.002;
+
+/// The polygons of the brick that holds an index cell, from back to front along every ray.
+pub(super) fn outlines(plan: &FramePlan, projector: &Projector<'_>, cell: UVec3) -> Vec<Outline> {
+    let (b, entry) = (brick_box(plan, cell), plan.index.at(cell));
+    if b.is_empty() || !matches!(entry, IndexEntry::Resident { .. }) {
+        return Vec::new();
+    }
+    let step = plan.sampling.step_world() * f64::from(entry.level().stride());
+    let mut outlines = match plan.sampling.lengths() {
+        Lengths::True => exits(plan, projector, &b),
+        Lengths::Nominal => Vec::new(),
+    };
+    for stack in stacks(plan, projector, &b) {
+        outlines.extend(stack.outlines(plan, projector, &b, step));
+    }
+    outlines.retain(|o| !o.points.is_empty());
+    outlines
+}
+
+/// The part of the domain that a brick owns, relative to the frame's centre.
+fn brick_box(plan: &FramePlan, cell: UVec3) -> Aabb {
+    let n_cells = f64::from(plan.bricks.side().n_cells());
+    let level = u32::from(plan.index.at(cell).level().0);
+    let low = cell >> level << level;
+    let high = low + (1 << level);
+    let owned = Aabb {
+        min: DVec3::select(low.cmpeq(UVec3::ZERO), plan.domain.min, low.as_dvec3() * n_cells),
+        max: DVec3::select(high.cmpge(plan.index.dims()), plan.domain.max, high.as_dvec3() * n_cells),
+    };
+    let b = owned.intersection(&plan.domain);
+    Aabb { min: b.min - plan.rays.center, max: b.max - plan.rays.center }
+}
+
+/// The faces through which rays leave a box.
+fn exits(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Outline> {
+    let forward = plan.rays.direction[0];
+    let leaves_up = |axis: usize| projector.eye().map_or(forward[axis] > 0.0, |eye| eye[axis] < b.max[axis]);
+    let leaves_down = |axis: usize| projector.eye().map_or(forward[axis] < 0.0, |eye| eye[axis] > b.min[axis]);
+    let up = (0..3).filter(|axis| leaves_up(*axis)).map(|axis| face(b, axis, b.max[axis]));
+    let down = (0..3).filter(|axis| leaves_down(*axis)).map(|axis| face(b, axis, b.min[axis]));
+    let outline = |polygon: Vec<DVec3>| Outline {
+        points: projector.project(&polygon),
+        surface: ProxyCorner::EXIT,
+        owner: ProxyCorner::ANY,
+    };
+    up.chain(down).map(outline).collect()
+}
+
+/// The stacks of planes that rays through a box may meet.
+fn stacks(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Stack> {
+    match plan.sampling.placement() {
+        // Spheres are drawn as if each ray had a facet of its own only by ray casters.
+        Placement::Shells | Placement::ViewportPlanes => vec![picture_plane(plan, projector, DVec3::Z, 0, Part::All)],
+        Placement::TessellatedShells { .. } => facets_over(plan, projector, b),
+        Placement::ObjectPlanes => object_stacks(plan, projector),
+    }
+}
+
+/// Planes of a normal in the camera's axes (right, down, forward).
+fn picture_plane(plan: &FramePlan, projector: &Projector<'_>, normal: DVec3, owner: u32, part: Part) -> Stack {
+    let scaled = DVec3::new(normal.x * plan.rays.pixel, normal.y * plan.rays.pixel, normal.z);
+    let gradient = (0..3).map(|axis| projector.gradient(axis) * scaled[axis]).sum();
+    let at_centre = scaled.dot(projector.camera(DVec3::ZERO));
+    Stack { gradient, offset: at_centre + projector.origin_depth() - plan.rays.start, owner, part }
+}
+
+/// The facets of the picture's squares that a box may be seen in.
+fn facets_over(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Stack> {
+    let rays = &plan.rays;
+    let faces = (0..3).flat_map(|axis| [face(b, axis, b.min[axis]), face(b, axis, b.max[axis])]);
+    let seen: Vec<DVec2> = faces.flat_map(|polygon| projector.project(&polygon)).collect();
+    let (Some(low), Some(high)) = (seen.iter().copied().reduce(DVec2::min), seen.iter().copied().reduce(DVec2::max))
+    else {
+        return Vec::new();
+    };
+    let side = f64::from(rays.facet_pixels());
+    let last = rays.facet_squares() - 1;
+    let square = |p: DVec2| (p / side).floor().max(DVec2::ZERO).as_uvec2().min(last);
+    let (low, high) = (square(low), square(high));
+    let squares = (low.y..=high.y).flat_map(|y| (low.x..=high.x).map(move |x| (x, y)));
+    let facets = squares.flat_map(|(x, y)| [0, 1].map(|half| 2 * (x + y * rays.facet_squares().x) + half));
+    let stack =
+        |f| picture_plane(plan, projector, rays.facet_normal(f), f, Part::Facet(rays.facet_corners(f)));
+    facets.map(stack).collect()
+}
+
+/// The stacks of object-aligned planes; parallel rays all meet one.
+fn object_stacks(plan: &FramePlan, projector: &Projector<'_>) -> Vec<Stack> {
+    let planes = &plan.rays.planes;
+    let stack = |axis: usize, up: bool, part| {
+        let (first, sign) = if up { (planes.low[axis], 1.0) } else { (planes.high[axis], -1.0) };
+        let per_voxel = sign * planes.voxel_world[axis];
+        let owner = 2 * axis as u32 + u32::from(up);
+        Stack { gradient: DVec3::AXES[axis] * per_voxel, offset: -first * per_voxel, owner, part }
+    };
+    match projector.eye() {
+        None => {
+            let axis = planes.axis(plan.rays.direction[0]);
+            vec![stack(axis, plan.rays.direction[0][axis] > 0.0, Part::All)]
+        }
+        Some(eye) => {
+            let both = |axis| [true, false].map(|up| stack(axis, up, Part::Pyramid { axis, eye }));
+            (0..3).flat_map(both).collect()
+        }
+    }
+}
+
+impl Stack {
+    /// The polygons of the planes in a box, the farthest along the rays first.
+    fn outlines(&self, plan: &FramePlan, projector: &Projector<'_>, b: &Aabb, step: f64) -> Vec<Outline> {
+        let b = &self.part.bounds(b, self.gradient);
+        if b.is_empty() {
+            return Vec::new();
+        }
+        let centre = self.gradient.dot(b.center()) + self.offset;
+        let reach = (self.gradient * b.extent()).abs().element_sum() * 0.5;
+        let shift = match plan.sampling.lengths() {
+            Lengths::True => 0.0,
+            Lengths::Nominal => 0.5,
+        };
+        let first = ((centre - reach) / step - shift).floor() as i64;
+        let last = ((centre + reach) / step - shift).ceil() as i64;
+        let outline = |k: i64| Outline {
+            points: self.seen(plan, projector, b, (k as f64 + shift) * step),
+            surface: k as f32,
+            owner: self.owner,
+        };
+        (first.max(0)..=last).rev().map(outline).collect()
+    }
+
+    /// Where the plane of this level is seen.
+    fn seen(&self, plan: &FramePlan, projector: &Projector<'_>, b: &Aabb, level: f64) -> Vec<DVec2> {
+        let polygon = slice(b, Plane { gradient: self.gradient, level: level - self.offset });
+        let polygon = match self.part {
+            Part::Pyramid { axis, eye } => in_pyramid(plan, polygon, axis, eye),
+            _ => polygon,
+        };
+        let seen = projector.project(&polygon);
+        match self.part {
+            Part::Facet(triangle) => in_triangle(seen, triangle),
+            _ => seen,
+        }
+    }
+}
+
+impl Part {
+    /// The part of a box that lies on the stack's side of the eye.
+    fn bounds(&self, b: &Aabb, gradient: DVec3) -> Aabb {
+        let Part::Pyramid { axis, eye } = *self else { return *b };
+        let mut bounds = *b;
+        if gradient[axis] > 0.0 {
+            bounds.min[axis] = bounds.min[axis].max(eye[axis]);
+        } else {
+            bounds.max[axis] = bounds.max[axis].min(eye[axis]);
+        }
+        bounds
+    }
+}
+
+/// The part of a polygon in a plane across an axis that is seen at a smaller angle to it than to the other two.
+fn in_pyramid(plan: &FramePlan, polygon: Vec<DVec3>, axis: usize, eye: DVec3) -> Vec<DVec3> {
+    let Some(first) = polygon.first() else { return polygon };
+    let world = plan.rays.planes.voxel_world;
+    let height = (first[axis] - eye[axis]).abs() * world[axis] * PYRAMID_MARGIN;
+    [(axis + 1) % 3, (axis + 2) % 3].into_iter().fold(polygon, |polygon, other| {
+        let reach = height / world[other];
+        let polygon = clip(&polygon, |p| p[other] - (eye[other] - reach));
+        clip(&polygon, |p| eye[other] + reach - p[other])
+    })
+}
+
+/// The part of a polygon of the picture that lies in a triangle.
+fn in_triangle(polygon: Vec<DVec2>, [a, b, c]: [DVec2; 3]) -> Vec<DVec2> {
+    let side = (b - a).perp_dot(c - a).signum();
+    [(a, b), (b, c), (c, a)].into_iter().fold(polygon, |polygon, (from, to)| {
+        clip(&polygon, |p| side * (to - from).perp_dot(p - from))
+    })
+}

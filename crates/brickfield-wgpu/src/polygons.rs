@@ -1,0 +1,108 @@
+//! Polygons, rasterised and blended over each other.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use brickfield_frame::{Held, ProxyGeometry, RenderError};
+use wgpu::BufferUsages;
+
+use crate::backend::milliseconds;
+use crate::buffer::Reused;
+use crate::clock::Clock;
+use crate::device::Device;
+use crate::pipeline::{Pipeline, Program};
+use crate::scene::{Scene, unbound};
+
+/// The polygons on the device.
+pub(crate) struct Polygons {
+    held: Held<ProxyGeometry>,
+    corners: Reused,
+    indices: Reused,
+}
+
+impl Polygons {
+    pub(crate) fn new() -> Polygons {
+        Polygons {
+            held: Held::nothing(),
+            corners: Reused::new("the polygons' corners", BufferUsages::VERTEX | BufferUsages::COPY_DST),
+            indices: Reused::new("the polygons' triangles", BufferUsages::INDEX | BufferUsages::COPY_DST),
+        }
+    }
+
+    /// Brings polygons to the device, if they are not there.
+    pub(crate) fn hold(&mut self, device: &Device, proxy: &Arc<ProxyGeometry>) -> Result<(), RenderError> {
+        if !self.held.is(proxy) {
+            self.held = Held::nothing();
+            self.corners.write(device, bytemuck::cast_slice(proxy.corners()))?;
+            self.indices.write(device, bytemuck::cast_slice(proxy.indices()))?;
+            self.held = Held::of(proxy);
+        }
+        Ok(())
+    }
+
+    /// Draws them into the scene's picture, batch by batch; device and wall time in milliseconds.
+    pub(crate) fn draw(
+        &self,
+        device: &Device,
+        pipeline: &Pipeline,
+        scene: &Scene,
+        proxy: &ProxyGeometry,
+        clock: Option<&Clock>,
+    ) -> Result<(Option<f64>, f64), RenderError> {
+        let (mut device_ms, started) = (clock.map(|_| 0.0), Instant::now());
+        let nothing = 0..0;
+        // Without a batch there is still a picture to be cleared.
+        let batches = if proxy.batches().is_empty() { std::slice::from_ref(&nothing) } else { proxy.batches() };
+        for (i, batch) in batches.iter().enumerate() {
+            let load = if i == 0 { wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT) } else { wgpu::LoadOp::Load };
+            self.draw_batch(device, pipeline, scene, (batch.clone(), load), clock)?;
+            device.wait("rendering")?;
+            let batch_ms = clock.map(|c| c.milliseconds(device)).transpose()?;
+            device_ms = device_ms.zip(batch_ms).map(|(sum, ms)| sum + ms);
+        }
+        Ok((device_ms, milliseconds(started)))
+    }
+
+    fn draw_batch(
+        &self,
+        device: &Device,
+        pipeline: &Pipeline,
+        scene: &Scene,
+        (batch, load): (std::ops::Range<u32>, wgpu::LoadOp<wgpu::Color>),
+        clock: Option<&Clock>,
+    ) -> Result<(), RenderError> {
+        let bound = scene.bind(device, pipeline)?;
+        let (Program::Polygons(program), Some(picture)) = (&pipeline.program, &scene.picture) else {
+            return Err(unbound());
+        };
+        let (Some(corners), Some(indices)) = (self.corners.buffer(), self.indices.buffer()) else {
+            return Err(unbound());
+        };
+        device.checked("drawing polygons", 0, || {
+            let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("polygons"),
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &picture.view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
+                })],
+                depth_stencil_attachment: None,
+                timestamp_writes: clock.map(Clock::draw_writes),
+                occlusion_query_set: None,
+                multiview_mask: None,
+            });
+            pass.set_pipeline(program);
+            pass.set_bind_group(0, &bound, &[]);
+            pass.set_vertex_buffer(0, corners.slice(..));
+            pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(batch, 0, 0..1);
+            drop(pass);
+            if let Some(clock) = clock {
+                clock.resolve(&mut encoder);
+            }
+            device.queue.submit([encoder.finish()]);
+        })
+    }
+}
