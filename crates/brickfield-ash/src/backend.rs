@@ -5,17 +5,19 @@ use std::time::Instant;
 
 use brickfield_core::Image as Picture;
 use brickfield_frame::{
-    Backend, Capabilities, Description, Frame, FramePlan, RenderError, ShaderFunction, Timing, check_memory,
+    Backend, Capabilities, Description, Frame, FramePlan, ProxyGeometry, RenderError, ShaderFunction, Target, Timing,
+    check_memory,
 };
 use brickfield_shaders::{Entry, ShaderLibrary, Variant, passes, pixels_per_pass};
 
 use crate::evaluate::Lists;
 use crate::march::{march, milliseconds_since, read_back, reserve_picture};
+use crate::polygons::{Polygons, reserve_canvas};
 use crate::options::choose;
 use crate::scene::Scene;
 use crate::staging::Staging;
 use crate::variants::Variants;
-use crate::vulkan::{Device, Image, Instance, PhysicalDevice, Queue, Resource, physical_devices};
+use crate::vulkan::{Canvas, Device, Image, Instance, PhysicalDevice, Queue, Resource, Use, physical_devices};
 use crate::{ConnectError, Options, ValidationLog};
 
 /// Replays frame plans through Vulkan, without a window.
@@ -27,6 +29,8 @@ pub struct AshBackend {
     pub(crate) staging: Staging,
     pub(crate) lists: Lists,
     picture: Option<Image>,
+    canvas: Option<Canvas>,
+    polygons: Polygons,
     description: Description,
 }
 
@@ -49,6 +53,8 @@ impl AshBackend {
             staging: Staging::new(&device),
             lists: Lists::new(),
             picture: None,
+            canvas: None,
+            polygons: Polygons::new(),
             description,
             device,
         })
@@ -89,12 +95,33 @@ impl AshBackend {
         let target = scene.uniforms().expect("the upload filled it");
         let time = march(&mut self.queue, &bound, picture, (target, uniforms), &passes(plan, group_height))?;
         let marched = Instant::now();
-        let image = read_back(&mut self.queue, &mut self.staging, picture)?;
+        let image = read_back(&mut self.queue, &mut self.staging, picture, (Target::Float32, Use::ShaderWrite))?;
         let read_back_ms = milliseconds_since(marched);
         Ok(Frame {
             image,
             timing: Timing { upload_ms, device_ms: time.device_ms, wall_ms: time.wall_ms, read_back_ms },
         })
+    }
+}
+
+impl AshBackend {
+    /// As [`replay`](Self::replay), by rasterising polygons.
+    fn rasterise(&mut self, plan: &FramePlan, proxy: &Arc<ProxyGeometry>) -> Result<Frame, RenderError> {
+        let (started, target) = (Instant::now(), proxy.target());
+        let canvas = reserve_canvas(&mut self.canvas, &self.device, target, plan.size())?;
+        let variant = Variant::of(plan, Entry::Proxy);
+        let pipeline = self.variants.blending_into(&self.device, variant, target)?;
+        self.scene.upload(&mut self.queue, &mut self.staging, plan, pipeline)?;
+        self.polygons.hold(&self.device, &mut self.queue, &mut self.staging, proxy)?;
+        let scene = &self.scene;
+        let bound = pipeline.bind(|binding| scene.resource(binding))?;
+        let upload_ms = milliseconds_since(started);
+        let time = self.polygons.draw(&mut self.queue, &bound, canvas, proxy)?;
+        let drawn = Instant::now();
+        let image = read_back(&mut self.queue, &mut self.staging, &canvas.image, (target, Use::Canvas))?;
+        let read_back_ms = milliseconds_since(drawn);
+        let timing = Timing { upload_ms, device_ms: time.device_ms, wall_ms: time.wall_ms, read_back_ms };
+        Ok(Frame { image, timing })
     }
 }
 
@@ -116,7 +143,10 @@ impl Backend for AshBackend {
         if plan.visible.is_empty() || plan.domain.is_empty() || size.min_element() == 0 {
             return Ok(Frame { image: Picture::transparent(size), timing: Timing::default() });
         }
-        self.replay(plan)
+        match &plan.proxy {
+            Some(proxy) => self.rasterise(plan, proxy),
+            None => self.replay(plan),
+        }
     }
 
     fn evaluate(

@@ -6,6 +6,7 @@ mod error;
 mod evaluate;
 mod march;
 mod options;
+mod polygons;
 mod scene;
 mod staging;
 mod variants;

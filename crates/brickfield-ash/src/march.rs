@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use brickfield_core::Image as Picture;
 use brickfield_core::glam::{UVec2, UVec3};
-use brickfield_frame::{FrameUniforms, Pass, RenderError};
+use brickfield_frame::{FrameUniforms, Pass, RenderError, Target};
 
 use crate::staging::{CHUNK_BYTES, Staging};
 use crate::vulkan::{BoundPipeline, Buffer, Device, Image, ImageBox, Queue, Use};
@@ -13,8 +13,8 @@ use crate::vulkan::{BoundPipeline, Buffer, Device, Image, ImageBox, Queue, Use};
 /// Bytes of a pixel, and of what a ray has seen.
 pub(crate) const PIXEL_BYTES: usize = size_of::<[f32; 4]>();
 
-/// How long the march took, in milliseconds.
-pub(crate) struct MarchTime {
+/// How long rendering took, in milliseconds.
+pub(crate) struct RenderTime {
     pub(crate) device_ms: Option<f64>,
     pub(crate) wall_ms: f64,
 }
@@ -39,7 +39,7 @@ pub(crate) fn march(
     picture: &Image,
     (buffer, uniforms): (&Buffer, FrameUniforms),
     passes: &[Pass],
-) -> Result<MarchTime, RenderError> {
+) -> Result<RenderTime, RenderError> {
     let started = Instant::now();
     let mut device_ms = Some(0.0);
     let mut before = Use::Nothing;
@@ -56,30 +56,31 @@ pub(crate) fn march(
         device_ms = device_ms.zip(pass_ms).map(|(sum, ms)| sum + ms);
         before = Use::ShaderWrite;
     }
-    Ok(MarchTime { device_ms, wall_ms: milliseconds_since(started) })
+    Ok(RenderTime { device_ms, wall_ms: milliseconds_since(started) })
 }
 
-/// Brings a rendered picture to the host, band by band.
+/// Brings a rendered picture of a format to the host, band by band; `before` is how it was made.
 pub(crate) fn read_back(
     queue: &mut Queue,
     staging: &mut Staging,
     picture: &Image,
+    (target, mut before): (Target, Use),
 ) -> Result<Picture<f32>, RenderError> {
     let UVec3 { x: width, y: height, .. } = picture.extent();
     let mut image = Picture::transparent(UVec2::new(width, height));
-    let rows_per_band = (CHUNK_BYTES / (width as usize * PIXEL_BYTES)).max(1);
-    let mut before = Use::ShaderWrite;
+    let rows_per_band = (CHUNK_BYTES / (width as usize * target.pixel_bytes())).max(1);
     for (i, rows) in image.pixels_mut().chunks_mut(rows_per_band * width as usize).enumerate() {
         let origin = UVec3::new(0, (i * rows_per_band) as u32, 0);
         let extent = UVec3::new(width, rows.len() as u32 / width, 1);
-        let n_bytes = size_of_val(rows);
-        let target = &*staging.read_back(n_bytes)?;
+        let n_bytes = rows.len() * target.pixel_bytes();
+        let host = &*staging.read_back(n_bytes)?;
         queue.run("reading the picture back", |recorder| {
             recorder.image_barrier(picture, before, Use::CopySource);
-            recorder.read_back(picture, target, PIXEL_BYTES as u64, ImageBox { buffer_offset: 0, origin, extent });
+            let part = ImageBox { buffer_offset: 0, origin, extent };
+            recorder.read_back(picture, host, target.pixel_bytes() as u64, part);
             recorder.barrier(Use::CopyTarget, Use::HostRead);
         })?;
-        bytemuck::cast_slice_mut(rows).copy_from_slice(target.read(n_bytes));
+        target.read(host.read(n_bytes), rows);
         before = Use::CopySource;
     }
     Ok(image)

@@ -26,6 +26,7 @@ pub(crate) struct Scene {
     occupancy: (Slot, Held<Occupancy>),
     beams: Slot,
     facets: Slot,
+    drawn: Slot,
 }
 
 /// A buffer that grows when it must, and how much of it is used.
@@ -50,6 +51,7 @@ impl Scene {
             occupancy: (Slot::new("the occupancy of bricks", vk::BufferUsageFlags::STORAGE_BUFFER), Held::nothing()),
             beams: Slot::new("the beams", vk::BufferUsageFlags::STORAGE_BUFFER),
             facets: Slot::new("the facets", vk::BufferUsageFlags::STORAGE_BUFFER),
+            drawn: Slot::new("the bricks of polygons", vk::BufferUsageFlags::STORAGE_BUFFER),
         })
     }
 
@@ -85,6 +87,11 @@ impl Scene {
             let bytes = bytemuck::cast_slice(&spans);
             staging.fill(queue, &[(self.beams.reserve(&self.device, bytes.len())?, bytes)])?;
         }
+        if pipeline.binds(11) {
+            let proxy = plan.proxy.as_ref().ok_or_else(|| missing("polygons"))?;
+            let bytes = bytemuck::cast_slice(proxy.bricks());
+            staging.fill(queue, &[(self.drawn.reserve(&self.device, bytes.len())?, bytes)])?;
+        }
         if pipeline.binds(12) {
             let planes = plan.rays.facet_planes();
             let bytes = bytemuck::cast_slice(&planes);
@@ -116,7 +123,7 @@ impl Scene {
 
     /// The buffer of the uniforms, once there was an upload.
     pub(crate) fn uniforms(&self) -> Option<&Buffer> {
-        self.uniforms.buffer.as_ref()
+        self.uniforms.buffer()
     }
 
     /// What the shader's bindings of a plan's data stand for.
@@ -130,6 +137,7 @@ impl Scene {
             8 => self.seen_before.resource(),
             9 => self.occupancy.0.resource(),
             10 => self.beams.resource(),
+            11 => self.drawn.resource(),
             12 => self.facets.resource(),
             _ => None,
         }
@@ -166,7 +174,7 @@ impl Slot {
     pub(crate) fn reserve(&mut self, device: &Arc<Device>, n_bytes: usize) -> Result<&Buffer, RenderError> {
         let (what, n_bytes) = (self.what, (n_bytes as u64).max(16));
         let limit = u64::from(device.physical().limits.max_storage_buffer_range);
-        if n_bytes > limit {
+        if n_bytes > limit && self.usage.contains(vk::BufferUsageFlags::STORAGE_BUFFER) {
             return Err(RenderError::BufferTooLarge { what, n_bytes, limit });
         }
         self.used_bytes = n_bytes;
@@ -175,6 +183,11 @@ impl Slot {
             Some(buffer) => Ok(buffer),
             none => Ok(none.insert(Buffer::on_device(device, what, n_bytes, self.usage)?)),
         }
+    }
+
+    /// The slot's buffer, once something was reserved.
+    pub(crate) fn buffer(&self) -> Option<&Buffer> {
+        self.buffer.as_ref()
     }
 
     /// The slot's used bytes as a shader's binding; `None` if nothing was reserved.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry::{Occupied, Vacant};
 use std::sync::Arc;
 
-use brickfield_frame::RenderError;
+use brickfield_frame::{RenderError, Target};
 use brickfield_shaders::{ShaderLibrary, Variant};
 
 use crate::vulkan::{Device, Pipeline};
@@ -12,7 +12,8 @@ use crate::vulkan::{Device, Pipeline};
 /// The variants that were needed so far; there are a few hundred in all.
 pub(crate) struct Variants {
     library: ShaderLibrary,
-    pipelines: HashMap<Variant, Pipeline>,
+    /// The target is that of polygons.
+    pipelines: HashMap<(Variant, Target), Pipeline>,
 }
 
 impl Variants {
@@ -21,14 +22,24 @@ impl Variants {
         Variants { library, pipelines: HashMap::new() }
     }
 
-    /// The pipeline of a variant, built if it is new.
+    /// The pipeline of a variant that computes, built if it is new.
     pub(crate) fn pipeline(&mut self, device: &Arc<Device>, variant: Variant) -> Result<&mut Pipeline, RenderError> {
-        match self.pipelines.entry(variant) {
+        self.blending_into(device, variant, Target::default())
+    }
+
+    /// The pipeline of a variant that blends polygons into a target.
+    pub(crate) fn blending_into(
+        &mut self,
+        device: &Arc<Device>,
+        variant: Variant,
+        target: Target,
+    ) -> Result<&mut Pipeline, RenderError> {
+        match self.pipelines.entry((variant, target)) {
             Occupied(known) => Ok(known.into_mut()),
             Vacant(new) => {
                 let shader = self.library.specialise(&variant);
                 let shader = shader.map_err(|e| RenderError::Shader { message: e.to_string() })?;
-                Ok(new.insert(Pipeline::new(device, &shader)?))
+                Ok(new.insert(Pipeline::new(device, &shader, target)?))
             }
         }
     }

@@ -28,6 +28,8 @@ pub(super) struct QueueFamily {
     pub(super) index: u32,
     /// Valid bits of a timestamp; 0 if the family has none.
     pub(super) timestamp_bits: u32,
+    /// Whether it rasterises.
+    pub(super) draws: bool,
 }
 
 /// The devices that speak Vulkan 1.1 or later, in the loader's order.
@@ -99,5 +101,10 @@ pub(super) fn queue_family(instance: &Instance, device: &PhysicalDevice) -> Resu
     let index = has(vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS)
         .or_else(|| has(vk::QueueFlags::COMPUTE))
         .ok_or_else(|| ConnectError::NoComputeQueue { adapter: device.summary.to_string() })?;
-    Ok(QueueFamily { index: index as u32, timestamp_bits: families[index].timestamp_valid_bits })
+    let family = &families[index];
+    Ok(QueueFamily {
+        index: index as u32,
+        timestamp_bits: family.timestamp_valid_bits,
+        draws: family.queue_flags.contains(vk::QueueFlags::GRAPHICS),
+    })
 }

@@ -46,6 +46,11 @@ impl Device {
         &self.instance
     }
 
+    /// Whether the queue rasterises.
+    pub(crate) fn draws(&self) -> bool {
+        self.family.draws
+    }
+
     /// What optimally tiled images of a format can do.
     pub(crate) fn format_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
         // SAFETY: the physical device is one of this instance.

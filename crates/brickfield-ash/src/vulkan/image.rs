@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use ash::vk;
 use brickfield_core::glam::{UVec2, UVec3};
-use brickfield_frame::{RenderError, SampleFormat};
+use brickfield_frame::{RenderError, SampleFormat, Target};
 
 use super::memory::{Allocation, refused};
 use super::{Device, Residence};
@@ -47,6 +47,16 @@ impl Image {
         let info = vk::ImageCreateInfo::default().image_type(vk::ImageType::TYPE_2D).format(format).usage(usage);
         let extent = size.extend(1);
         Image::new(device, ("the picture", 16 * n_texels(extent)), vk::ImageViewType::TYPE_2D, info, extent)
+    }
+
+    /// A picture that polygons are blended into, that is cleared before and copied after.
+    pub(crate) fn canvas(device: &Arc<Device>, target: Target, size: UVec2) -> Result<Image, RenderError> {
+        let copies = vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
+        let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | copies;
+        let format = target_format(target);
+        let info = vk::ImageCreateInfo::default().image_type(vk::ImageType::TYPE_2D).format(format).usage(usage);
+        let n_bytes = target.pixel_bytes() as u64 * n_texels(size.extend(1));
+        Image::new(device, ("the picture", n_bytes), vk::ImageViewType::TYPE_2D, info, size.extend(1))
     }
 
     fn new(
@@ -133,6 +143,14 @@ pub(crate) fn vulkan_format(format: SampleFormat) -> vk::Format {
         SampleFormat::Unorm8 => vk::Format::R8_UNORM,
         SampleFormat::Unorm16 => vk::Format::R16_UNORM,
         SampleFormat::Float32 => vk::Format::R32_SFLOAT,
+    }
+}
+
+/// The format of what polygons are blended into.
+pub(crate) fn target_format(target: Target) -> vk::Format {
+    match target {
+        Target::Float32 => vk::Format::R32G32B32A32_SFLOAT,
+        Target::Float16 => vk::Format::R16G16B16A16_SFLOAT,
     }
 }
 

@@ -6,6 +6,7 @@
 
 mod adapter;
 mod buffer;
+mod canvas;
 mod device;
 mod image;
 mod instance;
@@ -17,6 +18,7 @@ mod recorder;
 
 pub(crate) use adapter::{PhysicalDevice, physical_devices};
 pub(crate) use buffer::{Buffer, HostBuffer};
+pub(crate) use canvas::Canvas;
 pub(crate) use device::Device;
 pub(crate) use image::{Image, Sampler, vulkan_format};
 pub(crate) use instance::Instance;
@@ -24,4 +26,4 @@ pub(crate) use memory::Residence;
 pub use messages::ValidationLog;
 pub(crate) use pipeline::{BoundPipeline, Pipeline, Resource};
 pub(crate) use queue::Queue;
-pub(crate) use recorder::{ImageBox, Recorder, Use};
+pub(crate) use recorder::{ImageBox, Recorder, Triangles, Use};

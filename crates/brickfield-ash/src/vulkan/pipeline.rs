@@ -1,17 +1,19 @@
-//! Compute pipelines, and what is bound to them.
+//! Pipelines, and what is bound to them.
 #![expect(unsafe_code, reason = "Vulkan's functions are foreign")]
 
 use std::ffi::CString;
+use std::mem::offset_of;
 use std::sync::Arc;
 
 use ash::vk;
-use brickfield_frame::RenderError;
-use brickfield_shaders::{Binding, BindingKind, Specialised};
+use brickfield_frame::{ProxyCorner, RenderError, Target};
+use brickfield_shaders::{Binding, BindingKind, Entry, Specialised};
 
+use super::canvas::RenderPass;
 use super::{Buffer, Device, Image, Sampler};
 use crate::error::OfCall;
 
-/// A shader variant, ready to be dispatched.
+/// A shader variant, ready to be dispatched or drawn with.
 pub(crate) struct Pipeline {
     pub(super) raw: vk::Pipeline,
     pub(super) layout: vk::PipelineLayout,
@@ -19,6 +21,7 @@ pub(crate) struct Pipeline {
     set_layout: vk::DescriptorSetLayout,
     pool: vk::DescriptorPool,
     bindings: Vec<Binding>,
+    entry: Entry,
     workgroup_size: [u32; 3],
     device: Arc<Device>,
 }
@@ -38,8 +41,8 @@ pub(crate) struct BoundPipeline<'a> {
 }
 
 impl Pipeline {
-    /// The pipeline of a shader.
-    pub(crate) fn new(device: &Arc<Device>, shader: &Specialised) -> Result<Pipeline, RenderError> {
+    /// The pipeline of a shader; one of polygons blends them into `target`.
+    pub(crate) fn new(device: &Arc<Device>, shader: &Specialised, target: Target) -> Result<Pipeline, RenderError> {
         let spirv = shader.spirv().map_err(|e| RenderError::Shader { message: e.to_string() })?;
         let mut pipeline = Pipeline {
             raw: vk::Pipeline::null(),
@@ -48,12 +51,13 @@ impl Pipeline {
             set_layout: vk::DescriptorSetLayout::null(),
             pool: vk::DescriptorPool::null(),
             bindings: shader.bindings.clone(),
+            entry: shader.variant.entry,
             workgroup_size: shader.workgroup_size,
             device: device.clone(),
         };
         pipeline.lay_out()?;
         pipeline.allocate_set()?;
-        pipeline.compile(&spirv, shader.entry_point())?;
+        pipeline.compile(&spirv, target)?;
         Ok(pipeline)
     }
 
@@ -121,12 +125,16 @@ impl Pipeline {
     }
 
     fn lay_out(&mut self) -> Result<(), RenderError> {
+        let stages = match self.entry {
+            Entry::Proxy => vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
+            Entry::March | Entry::Evaluate(_) => vk::ShaderStageFlags::COMPUTE,
+        };
         let binding = |b: &Binding| {
             vk::DescriptorSetLayoutBinding::default()
                 .binding(b.index)
                 .descriptor_type(descriptor_type(b.kind))
                 .descriptor_count(1)
-                .stage_flags(vk::ShaderStageFlags::COMPUTE)
+                .stage_flags(stages)
         };
         let bindings: Vec<_> = self.bindings.iter().map(binding).collect();
         let set_layout = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
@@ -155,24 +163,119 @@ impl Pipeline {
         Ok(())
     }
 
-    fn compile(&mut self, spirv: &[u32], entry_point: &str) -> Result<(), RenderError> {
-        let name = CString::new(entry_point).map_err(|e| RenderError::Shader { message: e.to_string() })?;
-        let device = self.device.raw();
+    fn compile(&mut self, spirv: &[u32], target: Target) -> Result<(), RenderError> {
+        let device = self.device.clone();
         // SAFETY: naga validated the module that it wrote this code from.
-        let module = unsafe { device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(spirv), None) };
+        let module =
+            unsafe { device.raw().create_shader_module(&vk::ShaderModuleCreateInfo::default().code(spirv), None) };
         let module = module.of("vkCreateShaderModule")?;
-        let stage = vk::PipelineShaderStageCreateInfo::default()
-            .stage(vk::ShaderStageFlags::COMPUTE)
-            .module(module)
-            .name(&name);
-        let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout);
-        // SAFETY: module and layout are alive; the layout was made from the module's own bindings.
-        let made = unsafe { device.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
+        let made = match self.entry {
+            Entry::Proxy => self.compile_polygons(module, target),
+            Entry::March | Entry::Evaluate(_) => self.compile_compute(module),
+        };
         // SAFETY: a pipeline does not need its module any more.
-        unsafe { device.destroy_shader_module(module, None) };
-        self.raw = made.map_err(|(_, code)| code).of("vkCreateComputePipelines")?[0];
+        unsafe { device.raw().destroy_shader_module(module, None) };
+        self.raw = made?;
         Ok(())
     }
+
+    fn compile_compute(&self, module: vk::ShaderModule) -> Result<vk::Pipeline, RenderError> {
+        let names = names(self.entry)?;
+        let stage = stage(vk::ShaderStageFlags::COMPUTE, module, &names[0]);
+        let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout);
+        // SAFETY: module and layout are alive; the layout was made from the module's own bindings.
+        let made =
+            unsafe { self.device.raw().create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
+        Ok(made.map_err(|(_, code)| code).of("vkCreateComputePipelines")?[0])
+    }
+
+    /// Triangles of [`ProxyCorner`]s, seen from both sides, blended over what is there; viewport and scissor are set when drawing.
+    fn compile_polygons(&self, module: vk::ShaderModule, target: Target) -> Result<vk::Pipeline, RenderError> {
+        let names = names(self.entry)?;
+        let stages = [
+            stage(vk::ShaderStageFlags::VERTEX, module, &names[0]),
+            stage(vk::ShaderStageFlags::FRAGMENT, module, &names[1]),
+        ];
+        let buffers = [vk::VertexInputBindingDescription::default().stride(size_of::<ProxyCorner>() as u32)];
+        let attributes = corner_attributes();
+        let vertices = vk::PipelineVertexInputStateCreateInfo::default()
+            .vertex_binding_descriptions(&buffers)
+            .vertex_attribute_descriptions(&attributes);
+        let triangles = vk::PipelineInputAssemblyStateCreateInfo::default()
+            .topology(vk::PrimitiveTopology::TRIANGLE_LIST);
+        let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
+        let raster = vk::PipelineRasterizationStateCreateInfo::default()
+            .polygon_mode(vk::PolygonMode::FILL)
+            .cull_mode(vk::CullModeFlags::NONE)
+            .line_width(1.0);
+        let samples = vk::PipelineMultisampleStateCreateInfo::default()
+            .rasterization_samples(vk::SampleCountFlags::TYPE_1);
+        let blended = [over()];
+        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blended);
+        let changing = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&changing);
+        let pass = RenderPass::new(&self.device, target)?;
+        let info = vk::GraphicsPipelineCreateInfo::default()
+            .stages(&stages)
+            .vertex_input_state(&vertices)
+            .input_assembly_state(&triangles)
+            .viewport_state(&viewport)
+            .rasterization_state(&raster)
+            .multisample_state(&samples)
+            .color_blend_state(&blend)
+            .dynamic_state(&dynamic)
+            .layout(self.layout)
+            .render_pass(pass.raw);
+        // SAFETY: all that the description names is alive; stages and layout are of one module. The pass may go: those that
+        // the pipeline is used in are compatible.
+        let made =
+            unsafe { self.device.raw().create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
+        Ok(made.map_err(|(_, code)| code).of("vkCreateGraphicsPipelines")?[0])
+    }
+}
+
+fn names(entry: Entry) -> Result<Vec<CString>, RenderError> {
+    let name = |name: &&str| CString::new(*name).map_err(|e| RenderError::Shader { message: e.to_string() });
+    entry.entry_points().iter().map(name).collect()
+}
+
+fn stage(
+    stage: vk::ShaderStageFlags,
+    module: vk::ShaderModule,
+    name: &CString,
+) -> vk::PipelineShaderStageCreateInfo<'_> {
+    vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(name)
+}
+
+/// Where the members of a [`ProxyCorner`] go: locations in the order of its members.
+fn corner_attributes() -> [vk::VertexInputAttributeDescription; 4] {
+    let members = [
+        (offset_of!(ProxyCorner, pixel), vk::Format::R32G32_SFLOAT),
+        (offset_of!(ProxyCorner, surface), vk::Format::R32_SFLOAT),
+        (offset_of!(ProxyCorner, brick), vk::Format::R32_UINT),
+        (offset_of!(ProxyCorner, owner), vk::Format::R32_UINT),
+    ];
+    std::array::from_fn(|location| {
+        let (offset, format) = members[location];
+        vk::VertexInputAttributeDescription::default()
+            .location(location as u32)
+            .format(format)
+            .offset(offset as u32)
+    })
+}
+
+/// Premultiplied colours over what is there.
+fn over() -> vk::PipelineColorBlendAttachmentState {
+    let (one, rest) = (vk::BlendFactor::ONE, vk::BlendFactor::ONE_MINUS_SRC_ALPHA);
+    vk::PipelineColorBlendAttachmentState::default()
+        .blend_enable(true)
+        .src_color_blend_factor(one)
+        .dst_color_blend_factor(rest)
+        .color_blend_op(vk::BlendOp::ADD)
+        .src_alpha_blend_factor(one)
+        .dst_alpha_blend_factor(rest)
+        .alpha_blend_op(vk::BlendOp::ADD)
+        .color_write_mask(vk::ColorComponentFlags::RGBA)
 }
 
 impl Drop for Pipeline {

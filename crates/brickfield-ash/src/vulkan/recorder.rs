@@ -2,12 +2,13 @@
 #![expect(unsafe_code, reason = "Vulkan's functions are foreign")]
 
 use std::marker::PhantomData;
+use std::ops::Range;
 
 use ash::vk;
 use brickfield_core::glam::UVec3;
 
 use super::image::{WHOLE, extent_3d};
-use super::{BoundPipeline, Buffer, HostBuffer, Image};
+use super::{BoundPipeline, Buffer, Canvas, HostBuffer, Image};
 
 /// Records commands; what they name is borrowed for `'a`.
 pub(crate) struct Recorder<'q, 'a> {
@@ -25,10 +26,14 @@ pub(crate) enum Use {
     CopyTarget,
     /// A copy reads it.
     CopySource,
-    /// A shader reads it.
+    /// A shader that computes reads it.
     ShaderRead,
+    /// Drawing reads it: as corners and triangles, or in its shaders.
+    DrawRead,
     /// A shader writes it, and perhaps reads it.
     ShaderWrite,
+    /// Polygons are blended into it.
+    Canvas,
     /// The host reads it.
     HostRead,
 }
@@ -122,6 +127,49 @@ impl<'q, 'a> Recorder<'q, 'a> {
             self.device.cmd_dispatch(self.commands, n[0], n[1], n[2]);
         }
     }
+
+    /// Draws triangles of `indices` into a canvas, over what is there.
+    pub(crate) fn draw(&mut self, bound: &'a BoundPipeline<'a>, canvas: &'a Canvas, triangles: Triangles<'a>) {
+        let Triangles { corners, indices, range } = triangles;
+        assert!(u64::from(range.end) * 4 <= indices.n_bytes(), "a draw past the end of the triangles");
+        let (pipeline, graphics) = (bound.pipeline, vk::PipelineBindPoint::GRAPHICS);
+        let UVec3 { x: width, y: height, .. } = canvas.image.extent();
+        let area = vk::Rect2D::default().extent(vk::Extent2D { width, height });
+        // y upwards, as naga's shaders have it.
+        let viewport = vk::Viewport {
+            x: 0.0,
+            y: height as f32,
+            width: width as f32,
+            height: -(height as f32),
+            min_depth: 0.0,
+            max_depth: 1.0,
+        };
+        let pass = vk::RenderPassBeginInfo::default()
+            .render_pass(canvas.pass.raw)
+            .framebuffer(canvas.framebuffer)
+            .render_area(area);
+        // SAFETY: canvas, pipeline, its set, what is bound, and both buffers outlive the run. The pipeline was made for a pass
+        // like the canvas's; indices are inside their buffer (asserted), and name corners that were uploaded with them.
+        unsafe {
+            self.device.cmd_begin_render_pass(self.commands, &pass, vk::SubpassContents::INLINE);
+            self.device.cmd_bind_pipeline(self.commands, graphics, pipeline.raw);
+            self.device.cmd_bind_descriptor_sets(self.commands, graphics, pipeline.layout, 0, &[pipeline.set], &[]);
+            self.device.cmd_set_viewport(self.commands, 0, &[viewport]);
+            self.device.cmd_set_scissor(self.commands, 0, &[area]);
+            self.device.cmd_bind_vertex_buffers(self.commands, 0, &[corners.raw], &[0]);
+            self.device.cmd_bind_index_buffer(self.commands, indices.raw, 0, vk::IndexType::UINT32);
+            self.device.cmd_draw_indexed(self.commands, range.end - range.start, 1, range.start, 0, 0);
+            self.device.cmd_end_render_pass(self.commands);
+        }
+    }
+}
+
+/// Triangles to be drawn: some of the indices, three for each, into the corners.
+#[derive(Clone)]
+pub(crate) struct Triangles<'a> {
+    pub(crate) corners: &'a Buffer,
+    pub(crate) indices: &'a Buffer,
+    pub(crate) range: Range<u32>,
 }
 
 impl Use {
@@ -132,6 +180,14 @@ impl Use {
             Use::CopyTarget => (Stage::TRANSFER, Access::TRANSFER_WRITE),
             Use::CopySource => (Stage::TRANSFER, Access::TRANSFER_READ),
             Use::ShaderRead => (Stage::COMPUTE_SHADER, Access::SHADER_READ | Access::UNIFORM_READ),
+            Use::DrawRead => (
+                Stage::VERTEX_INPUT | Stage::VERTEX_SHADER | Stage::FRAGMENT_SHADER,
+                Access::VERTEX_ATTRIBUTE_READ | Access::INDEX_READ | Access::UNIFORM_READ | Access::SHADER_READ,
+            ),
+            Use::Canvas => (
+                Stage::COLOR_ATTACHMENT_OUTPUT,
+                Access::COLOR_ATTACHMENT_READ | Access::COLOR_ATTACHMENT_WRITE,
+            ),
             Use::ShaderWrite => (Stage::COMPUTE_SHADER, Access::SHADER_READ | Access::SHADER_WRITE),
             Use::HostRead => (Stage::HOST, Access::HOST_READ),
         }
@@ -142,7 +198,8 @@ impl Use {
             Use::Nothing => vk::ImageLayout::UNDEFINED,
             Use::CopyTarget => vk::ImageLayout::TRANSFER_DST_OPTIMAL,
             Use::CopySource => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
-            Use::ShaderRead => vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+            Use::ShaderRead | Use::DrawRead => vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+            Use::Canvas => vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
             Use::ShaderWrite | Use::HostRead => vk::ImageLayout::GENERAL,
         }
     }

@@ -1,0 +1,93 @@
+//! Polygons, rasterised and blended over each other.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use ash::vk;
+use brickfield_core::glam::UVec2;
+use brickfield_frame::{Held, ProxyGeometry, RenderError, Target};
+
+use crate::march::{RenderTime, milliseconds_since};
+use crate::scene::Slot;
+use crate::staging::Staging;
+use crate::vulkan::{BoundPipeline, Canvas, Device, Queue, Triangles, Use};
+
+/// The polygons on the device.
+pub(crate) struct Polygons {
+    held: Held<ProxyGeometry>,
+    corners: Slot,
+    indices: Slot,
+}
+
+impl Polygons {
+    /// None yet.
+    pub(crate) fn new() -> Polygons {
+        Polygons {
+            held: Held::nothing(),
+            corners: Slot::new("the polygons' corners", vk::BufferUsageFlags::VERTEX_BUFFER),
+            indices: Slot::new("the polygons' triangles", vk::BufferUsageFlags::INDEX_BUFFER),
+        }
+    }
+
+    /// Brings polygons to the device, if they are not there.
+    pub(crate) fn hold(
+        &mut self,
+        device: &Arc<Device>,
+        queue: &mut Queue,
+        staging: &mut Staging,
+        proxy: &Arc<ProxyGeometry>,
+    ) -> Result<(), RenderError> {
+        if !self.held.is(proxy) {
+            self.held = Held::nothing();
+            let (corners, indices) = (bytemuck::cast_slice(proxy.corners()), bytemuck::cast_slice(proxy.indices()));
+            let to_corners = self.corners.reserve(device, corners.len())?;
+            let to_indices = self.indices.reserve(device, indices.len())?;
+            staging.fill(queue, &[(to_corners, corners), (to_indices, indices)])?;
+            self.held = Held::of(proxy);
+        }
+        Ok(())
+    }
+
+    /// Clears a canvas and draws the polygons into it, batch by batch.
+    pub(crate) fn draw(
+        &self,
+        queue: &mut Queue,
+        bound: &BoundPipeline<'_>,
+        canvas: &Canvas,
+        proxy: &ProxyGeometry,
+    ) -> Result<RenderTime, RenderError> {
+        let started = Instant::now();
+        let mut device_ms = queue.run_timed("clearing the picture", |recorder| {
+            recorder.image_barrier(&canvas.image, Use::Nothing, Use::CopyTarget);
+            recorder.clear(&canvas.image);
+            recorder.image_barrier(&canvas.image, Use::CopyTarget, Use::Canvas);
+        })?;
+        let (Some(corners), Some(indices)) = (self.corners.buffer(), self.indices.buffer()) else {
+            return Err(RenderError::Shader { message: "polygons are drawn before they are uploaded".to_owned() });
+        };
+        for range in proxy.batches() {
+            let triangles = Triangles { corners, indices, range: range.clone() };
+            let batch_ms = queue.run_timed("drawing polygons", |recorder| {
+                recorder.barrier(Use::CopyTarget, Use::DrawRead);
+                recorder.image_barrier(&canvas.image, Use::Canvas, Use::Canvas);
+                recorder.draw(bound, canvas, triangles);
+            })?;
+            device_ms = device_ms.zip(batch_ms).map(|(sum, ms)| sum + ms);
+        }
+        Ok(RenderTime { device_ms, wall_ms: milliseconds_since(started) })
+    }
+}
+
+/// The canvas to draw into, of exactly this kind and size.
+pub(crate) fn reserve_canvas<'a>(
+    slot: &'a mut Option<Canvas>,
+    device: &Arc<Device>,
+    target: Target,
+    size: UVec2,
+) -> Result<&'a Canvas, RenderError> {
+    slot.take_if(|canvas| !canvas.fits(target, size));
+    match slot {
+        Some(canvas) => Ok(canvas),
+        none => Ok(none.insert(Canvas::new(device, target, size)?)),
+    }
+}
