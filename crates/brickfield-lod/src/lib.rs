@@ -2,10 +2,12 @@
 
 mod criterion;
 mod frustum;
+mod order;
 mod select;
 mod tile;
 
 pub use criterion::{Answer, Criterion};
 pub use frustum::{Frustum, Planes};
+pub use order::back_to_front;
 pub use select::{Culling, Selection, View, select_by, select_cut};
 pub use tile::Tile;
