@@ -21,8 +21,8 @@ pub struct Scene {
     pub rule: QuadratureRule,
     /// Exact or fast.
     pub mode: Mode,
-    /// Which resolution each part is drawn from.
-    pub detail: Criterion,
+    /// Which resolution each part is drawn from: the coarsest that satisfies all; none asks for the coarsest of all.
+    pub detail: Vec<Criterion>,
     /// The part of the volume that is shown, in index space; `None` is all of it.
     pub clip: Option<Aabb>,
     /// Whether transparent bricks are left out.
@@ -49,7 +49,7 @@ impl Scene {
             step_voxels: 0.5,
             rule: QuadratureRule::MidpointExponential,
             mode: Mode::Exact,
-            detail: Criterion::FullResolution,
+            detail: vec![Criterion::FullResolution],
             clip: None,
             skipping: Skipping::On,
         }
