@@ -108,13 +108,8 @@ impl Cut {
     /// order in which they are taken.
     pub fn descend<S: Copy>(layout: BrickLayout, state: S, mut visit: impl FnMut(BrickId, S) -> Option<S>) -> Cut {
         let mut bricks = Vec::new();
-        let mut stack = vec![(layout.root(), state)];
-        while let Some((id, state)) = stack.pop() {
-            match visit(id, state) {
-                Some(state) if id.level.0 > 0 => stack.extend(layout.children(id).map(|child| (child, state))),
-                _ => bricks.push(id),
-            }
-        }
+        // The root is the only child of a parent that there is none of.
+        take_children(&layout, layout.root().parent(), state, &mut visit, &mut bricks);
         Cut { layout, bricks }
     }
 
@@ -135,6 +130,22 @@ impl Cut {
             n[usize::from(id.level.0)] += 1;
         }
         n
+    }
+}
+
+/// Takes the children of a brick, or theirs.
+fn take_children<S: Copy>(
+    layout: &BrickLayout,
+    parent: BrickId,
+    state: S,
+    visit: &mut impl FnMut(BrickId, S) -> Option<S>,
+    bricks: &mut Vec<BrickId>,
+) {
+    for id in layout.children(parent) {
+        match visit(id, state) {
+            Some(state) if id.level.0 > 0 => take_children(layout, id, state, visit, bricks),
+            _ => bricks.push(id),
+        }
     }
 }
 

@@ -71,17 +71,18 @@ impl fmt::Display for BrickSide {
 pub struct BrickLayout {
     dims: UVec3,
     side: BrickSide,
+    /// Of level 0. No division is left to the descents that ask for those of a level.
+    n_bricks: UVec3,
     n_levels: u8,
 }
 
 impl BrickLayout {
     /// The layout over a volume of `dims` samples. A zero dimension counts as one.
     pub fn new(dims: UVec3, side: BrickSide) -> BrickLayout {
-        let mut layout = BrickLayout { dims: dims.max(UVec3::ONE), side, n_levels: 1 };
-        while layout.n_bricks(Level(layout.n_levels - 1)) != UVec3::ONE {
-            layout.n_levels += 1;
-        }
-        layout
+        let dims = dims.max(UVec3::ONE);
+        let n_bricks = UVec3::from(dims.to_array().map(|n| (n - 1).div_ceil(side.n_cells()).max(1)));
+        let n_levels = 1 + n_bricks.max_element().next_power_of_two().trailing_zeros() as u8;
+        BrickLayout { dims, side, n_bricks, n_levels }
     }
 
     /// Samples of the volume along x, y, z.
@@ -110,9 +111,9 @@ impl BrickLayout {
     }
 
     /// Bricks of a level along x, y, z.
+    #[inline]
     pub fn n_bricks(&self, level: Level) -> UVec3 {
-        let cells = u64::from(self.side.n_cells()) << level.0;
-        UVec3::from(self.dims.to_array().map(|n| u64::from(n - 1).div_ceil(cells).max(1) as u32))
+        ((self.n_bricks - 1) >> u32::from(level.0)) + 1
     }
 
     /// Number of bricks of a level.
@@ -141,6 +142,7 @@ impl BrickLayout {
     }
 
     /// The bricks one level finer that tile `id` exactly: one to eight, none for level 0.
+    #[inline]
     pub fn children(&self, id: BrickId) -> impl Iterator<Item = BrickId> + use<> {
         let finer = id.level.0.checked_sub(1).map(Level);
         let n = finer.map_or(UVec3::ZERO, |l| self.n_bricks(l));
@@ -153,6 +155,7 @@ impl BrickLayout {
     /// The box that a brick owns, in **sample space**: half-open, cut at the last sample.
     ///
     /// Along an axis of one sample the box has no extent.
+    #[inline]
     pub fn sample_box(&self, id: BrickId) -> Aabb {
         let cells = f64::from(self.side.n_cells()) * f64::from(id.level.stride());
         let min = id.coords.as_dvec3() * cells;
@@ -162,6 +165,7 @@ impl BrickLayout {
     /// The box that a brick owns, in **index space**: the bricks of any level tile [0, dims) exactly.
     ///
     /// First and last bricks include the half voxels before the first and after the last sample.
+    #[inline]
     pub fn index_box(&self, id: BrickId) -> Aabb {
         let b = self.sample_box(id);
         let first = id.coords.cmpeq(UVec3::ZERO);

@@ -3,6 +3,8 @@
 use brickfield_core::glam::{DAffine3, DVec3, UVec2};
 use brickfield_core::{Aabb, Camera, Grid};
 
+use crate::{Answer, Filter, Tile};
+
 const N_PLANES: usize = 5;
 
 /// Relative rounding of the plane test; a brick nearer to a plane than that counts as inside.
@@ -12,20 +14,29 @@ const TOLERANCE: f64 = 1e-12;
 ///
 /// Bricks are boxes in index space whatever the grid's direction and spacing, so that one test serves sheared,
 /// anisotropic and mirrored grids.
+///
+/// As a filter it ignores what lies outside and renders the rest. It is conservative: a brick that a ray reaches is never
+/// outside; one near an edge of the frustum may lie outside and be rendered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frustum {
     planes: [Plane; N_PLANES],
 }
 
-/// A set of a frustum's planes: those that a box has not been found to lie wholly inside of.
+/// A set of a frustum's planes: those that a brick has not been found to lie wholly inside of. All, by default.
+///
+/// The children of a brick need to be tested against no others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Planes(u8);
 
 impl Planes {
-    /// All planes: where a descent starts.
-    pub const ALL: Planes = Planes((1 << N_PLANES) - 1);
-    /// No plane: a box wholly inside the frustum.
-    pub const NONE: Planes = Planes(0);
+    const ALL: Planes = Planes((1 << N_PLANES) - 1);
+    const NONE: Planes = Planes(0);
+}
+
+impl Default for Planes {
+    fn default() -> Planes {
+        Planes::ALL
+    }
 }
 
 /// The half space normal . p + offset >= 0.
@@ -55,10 +66,7 @@ impl Frustum {
     }
 
     /// Which of `planes` the index-space box crosses; `None` if it lies wholly outside one of them.
-    ///
-    /// Conservative: a box that a ray reaches is never outside. A box near an edge of the frustum may lie outside and be
-    /// taken for crossing. The children of a box need to be tested against the planes that it crosses only.
-    pub fn crossed(&self, b: &Aabb, planes: Planes) -> Option<Planes> {
+    fn crossed(&self, b: &Aabb, planes: Planes) -> Option<Planes> {
         let (center, half) = (b.center(), b.extent() * 0.5);
         let mut crossed = Planes::NONE;
         for (i, plane) in self.planes.iter().enumerate().filter(|(i, _)| planes.0 >> i & 1 == 1) {
@@ -73,6 +81,21 @@ impl Frustum {
             }
         }
         Some(crossed)
+    }
+}
+
+impl Filter for Frustum {
+    type Known = Planes;
+
+    #[inline]
+    fn answer_knowing(&self, tile: &Tile<'_>, known: Planes) -> (Answer, Planes) {
+        if known == Planes::NONE {
+            return (Answer::Render, known);
+        }
+        match self.crossed(&tile.index_box(), known) {
+            Some(crossed) => (Answer::Render, crossed),
+            None => (Answer::Ignore, known),
+        }
     }
 }
 

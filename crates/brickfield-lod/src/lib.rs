@@ -1,11 +1,15 @@
 #![doc = include_str!("../README.md")]
 
 mod criterion;
+mod filter;
 mod frustum;
+mod order;
 mod select;
 mod tile;
 
-pub use criterion::{Answer, Criterion};
+pub use criterion::{Criterion, CriterionInView};
+pub use filter::{And, Answer, Filter};
 pub use frustum::{Frustum, Planes};
+pub use order::back_to_front;
 pub use select::{Culling, Selection, View, select_by, select_cut};
 pub use tile::Tile;

@@ -1,10 +1,9 @@
-//! From a view and a criterion to a cut: the descent through the octree.
+//! From a view and criteria to a cut: the descent through the octree.
 
 use brickfield_core::glam::UVec2;
-use brickfield_core::{BrickId, BrickLayout, Camera, Cut, Grid, Level, WorldPos};
+use brickfield_core::{BrickId, BrickLayout, Camera, Cut, Grid, Level};
 
-use crate::tile::Ruler;
-use crate::{Answer, Criterion, Frustum, Planes};
+use crate::{Answer, Criterion, CriterionInView, Filter, Frustum, Tile};
 
 /// From where, and through which picture, the volume is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,8 +28,8 @@ pub enum Culling {
 
 /// A cut, and which of its bricks were ignored.
 ///
-/// The ignored bricks are in the cut so that it tiles the volume; no ray meets them, so they are neither uploaded nor
-/// sampled. An ignored brick stands for its whole subtree.
+/// The ignored bricks are in the cut so that it tiles the volume. An ignored brick stands for its whole subtree. No ray
+/// meets a brick that [`select_cut`] ignores, so it is neither uploaded nor sampled.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Selection {
     cut: Cut,
@@ -53,7 +52,7 @@ impl Selection {
         self.answered(false)
     }
 
-    /// The bricks that no ray can reach.
+    /// The bricks that are not needed.
     pub fn ignored(&self) -> impl Iterator<Item = BrickId> + Clone + '_ {
         self.answered(true)
     }
@@ -73,37 +72,28 @@ impl Selection {
     }
 }
 
-/// The bricks that `criterion` asks for in a view; cost is proportional to the bricks visited.
+/// The bricks that satisfy all of `criteria` in a view; cost is proportional to the bricks visited.
 ///
-/// Depth first from the root (LaMar, Hamann and Joy 1999, section 4.1). `grid` says where the layout's samples lie.
-pub fn select_cut(layout: &BrickLayout, grid: &Grid, view: &View, criterion: &Criterion) -> Selection {
-    let frustum = Frustum::new(grid, &view.camera, view.size);
-    let (ruler, eye) = (Ruler::new(layout, grid), WorldPos(view.camera.eye()));
-    let planes = match view.culling {
-        Culling::Frustum => Planes::ALL,
-        Culling::Off => Planes::NONE,
-    };
-    descend(layout, planes, |id, planes| match visible(&frustum, layout, id, planes) {
-        None => (Answer::Ignore, planes),
-        Some(planes) => (criterion.judge(id, || ruler.tile(id), eye), planes),
-    })
+/// Depth first from the root (LaMar, Hamann and Joy 1999, section 4.1). `grid` says where the layout's samples lie. No
+/// criterion is satisfied by all: the root is drawn, and every criterion that is added draws it finer or leaves it.
+pub fn select_cut(layout: &BrickLayout, grid: &Grid, view: &View, criteria: &[Criterion]) -> Selection {
+    let all = All(criteria.iter().map(|criterion| criterion.in_view(view)).collect());
+    match view.culling {
+        Culling::Frustum => select_by(layout, grid, Frustum::new(grid, &view.camera, view.size).and(all)),
+        Culling::Off => select_by(layout, grid, all),
+    }
 }
 
-/// The bricks that a filter of one's own asks for.
+/// The bricks that a filter asks for.
 ///
-/// The filter is asked of the root, then of the children of every brick to which it says descend. A brick of level 0
-/// that it finds too coarse is drawn: there is nothing finer.
-pub fn select_by(layout: &BrickLayout, mut filter: impl FnMut(BrickId) -> Answer) -> Selection {
-    descend(layout, (), |id, ()| (filter(id), ()))
-}
-
-/// The filter's second answer goes to the children.
-fn descend<S: Copy>(layout: &BrickLayout, state: S, mut filter: impl FnMut(BrickId, S) -> (Answer, S)) -> Selection {
+/// The filter is asked about the root, then about the children of every brick to which it says descend. A brick of level
+/// 0 that it finds too coarse is drawn: there is nothing finer.
+pub fn select_by<F: Filter>(layout: &BrickLayout, grid: &Grid, filter: F) -> Selection {
     let mut is_ignored = Vec::new();
-    let cut = Cut::descend(*layout, state, |id, state| {
-        let (answer, state) = filter(id, state);
+    let cut = Cut::descend(*layout, F::Known::default(), |id, known| {
+        let (answer, known) = filter.answer_knowing(&Tile::new(layout, grid, id), known);
         if answer == Answer::Descend && id.level > Level(0) {
-            return Some(state);
+            return Some(known);
         }
         is_ignored.push(answer == Answer::Ignore);
         None
@@ -111,10 +101,15 @@ fn descend<S: Copy>(layout: &BrickLayout, state: S, mut filter: impl FnMut(Brick
     Selection { cut, is_ignored }
 }
 
-#[inline]
-fn visible(frustum: &Frustum, layout: &BrickLayout, id: BrickId, planes: Planes) -> Option<Planes> {
-    if planes == Planes::NONE {
-        return Some(planes);
+/// Criteria that must all be satisfied.
+struct All(Vec<CriterionInView>);
+
+impl Filter for All {
+    type Known = ();
+
+    #[inline]
+    fn answer_knowing(&self, tile: &Tile<'_>, (): ()) -> (Answer, ()) {
+        let is_satisfied = self.0.iter().all(|criterion| criterion.answer(tile) == Answer::Render);
+        (if is_satisfied { Answer::Render } else { Answer::Descend }, ())
     }
-    frustum.crossed(&layout.index_box(id), planes)
 }

@@ -4,9 +4,9 @@ mod scene;
 
 use brickfield_core::glam::{DMat3, DVec2, DVec3, UVec2, UVec3, Vec3Swizzles};
 use brickfield_core::{BrickLayout, BrickSide, Camera, Grid, Projection, Ray};
-use brickfield_lod::{Criterion, Culling, Frustum, Planes, View, select_cut};
+use brickfield_lod::{Answer, Criterion, Culling, Filter, Frustum, Tile, View, select_cut};
 use proptest::prelude::*;
-use scene::{Scene, criterion, scene};
+use scene::{Scene, criteria, scene};
 
 /// In index space; the parameter stays in world units.
 fn rays(scene: &Scene) -> Vec<Ray> {
@@ -26,8 +26,8 @@ fn rays(scene: &Scene) -> Vec<Ray> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(512))]
     #[test]
-    fn no_ray_meets_an_ignored_brick(scene in scene(Culling::Frustum), criterion in criterion()) {
-        let selection = select_cut(&scene.layout, &scene.grid, &scene.view, &criterion);
+    fn no_ray_meets_an_ignored_brick(scene in scene(Culling::Frustum), criteria in criteria()) {
+        let selection = select_cut(&scene.layout, &scene.grid, &scene.view, &criteria);
         let rays = rays(&scene);
         for id in selection.ignored() {
             let b = scene.layout.index_box(id);
@@ -40,10 +40,10 @@ proptest! {
     }
 
     #[test]
-    fn a_brick_is_ignored_only_below_one_that_is_in_view(scene in scene(Culling::Frustum), criterion in criterion()) {
+    fn a_brick_is_ignored_only_below_one_that_is_in_view(scene in scene(Culling::Frustum), criteria in criteria()) {
         let frustum = Frustum::new(&scene.grid, &scene.view.camera, scene.view.size);
-        let in_view = |id| frustum.crossed(&scene.layout.index_box(id), Planes::ALL).is_some();
-        let selection = select_cut(&scene.layout, &scene.grid, &scene.view, &criterion);
+        let in_view = |id| frustum.answer(&Tile::new(&scene.layout, &scene.grid, id)) == Answer::Render;
+        let selection = select_cut(&scene.layout, &scene.grid, &scene.view, &criteria);
         prop_assert!(selection.drawn().all(in_view));
         prop_assert!(selection.ignored().all(|id| !in_view(id)));
         prop_assert!(selection.ignored().all(|id| id == scene.layout.root() || in_view(id.parent())));
@@ -62,7 +62,7 @@ fn slab(eye: DVec3, target: DVec3, projection: Projection) -> (BrickLayout, Grid
 fn a_volume_behind_the_eye_is_ignored_whole() {
     for projection in [Projection::Perspective { fov_y: 1.0 }, Projection::Orthographic { height: 1e3 }] {
         let (layout, grid, view) = slab(DVec3::Z * 10.0, DVec3::Z * 20.0, projection);
-        let selection = select_cut(&layout, &grid, &view, &Criterion::FullResolution);
+        let selection = select_cut(&layout, &grid, &view, &[Criterion::FullResolution]);
         assert_eq!(selection.ignored().collect::<Vec<_>>(), [layout.root()]);
     }
 }
@@ -72,7 +72,7 @@ fn a_picture_of_four_tiles_draws_four_tiles() {
     // The picture shows samples 95 to 115 of both axes: parts of tiles 6 (samples 90 to 105) and 7.
     let at = DVec3::new(105.0, 105.0, 0.0);
     let (layout, grid, view) = slab(at + DVec3::Z * 10.0, at, Projection::Orthographic { height: 20.0 });
-    let selection = select_cut(&layout, &grid, &view, &Criterion::FullResolution);
+    let selection = select_cut(&layout, &grid, &view, &[Criterion::FullResolution]);
     assert_eq!(selection.n_drawn_per_level(), [4, 0, 0, 0, 0]);
     assert!(selection.drawn().all(|id| (id.coords.xy() - 6).cmple(UVec2::ONE).all()));
 }
@@ -82,6 +82,6 @@ fn a_perspective_picture_draws_the_tiles_that_it_shows() {
     // Half the height at distance 100 is 100 tan(0.1) = 10.03.
     let at = DVec3::new(105.0, 105.0, 0.0);
     let (layout, grid, view) = slab(at + DVec3::Z * 100.0, at, Projection::Perspective { fov_y: 0.2 });
-    let selection = select_cut(&layout, &grid, &view, &Criterion::FullResolution);
+    let selection = select_cut(&layout, &grid, &view, &[Criterion::FullResolution]);
     assert_eq!(selection.n_drawn_per_level(), [4, 0, 0, 0, 0]);
 }

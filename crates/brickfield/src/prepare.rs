@@ -6,13 +6,13 @@ use brickfield_bricks::BrickTree;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BrickId, Level, ValueRange};
 use brickfield_frame::{
-    Beams, Division, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, RayFrame, Sampling, SamplingError, Steps,
+    Beams, Division, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, Placement, RayFrame, Sampling, SamplingError, Steps,
 };
-use brickfield_lod::{Culling, Selection, View, select_cut};
+use brickfield_lod::{Culling, Selection, View, back_to_front, select_cut};
 use brickfield_optics::QuadratureRule;
 
 use crate::visibility::Visibility;
-use crate::{Residency, Scene, Skipping};
+use crate::{Residency, Scene, Skipping, Technique};
 
 /// Why a scene could not be prepared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -33,6 +33,10 @@ pub enum PrepareError {
     TooManySegments { n_segments: f64, limit: u32 },
     #[error("{n_bricks} bricks; an index tells at most {limit} apart: take larger bricks or a coarser level")]
     TooManyBricks { n_bricks: usize, limit: u32 },
+    #[error("polygons of spherical shells: a sphere has none; take tessellated shells")]
+    RoundPolygons,
+    #[error("polygons of whole rays: they are clipped to bricks; divide bricks")]
+    PolygonsOfRays,
     #[error(transparent)]
     Sampling(#[from] SamplingError),
 }
@@ -55,6 +59,7 @@ pub const MAX_SEGMENTS: u32 = 1 << 24;
 pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Result<FramePlan, PrepareError> {
     check_size(scene.size)?;
     check_values(tree)?;
+    check_technique(scene)?;
     let grid = tree.grid();
     let domain = clipped_domain(tree, scene.clip)?;
     let step_world = scene.step_voxels * grid.spacing().min_element();
@@ -76,8 +81,14 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
     let index = index_grid(tree, &resident);
     let visible = visible_box(tree, &resident, &domain);
     let levels_differ = resident.iter().any(|id| id.level != Level(0));
+    let ordered = match scene.technique {
+        Technique::RayCasting => Vec::new(),
+        Technique::Polygons(_) => from_back_to_front(tree, scene, &resident),
+    };
     let bricks = residency.hold(tree, resident);
     let (occupancy, overview) = match scene.skipping {
+        // What is inside bricks is not looked at before it is drawn.
+        _ if scene.technique != Technique::RayCasting => (None, None),
         Skipping::On => {
             let occupancy = residency.occupancy(&scene.transfer);
             let overview = residency.overview(&index, occupancy.as_ref());
@@ -99,9 +110,18 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
         proxy: None,
         features: FeatureSet::default(),
     };
+    if let Technique::Polygons(target) = scene.technique {
+        plan.proxy = Some(residency.proxy(&plan, &ordered, target));
+    }
     plan.beams = overview.and_then(|overview| Beams::of(&plan, &overview)).map(Arc::new);
     plan.features = features(&plan, levels_differ);
     Ok(plan)
+}
+
+/// An index cell of each brick, the farthest brick first.
+fn from_back_to_front(tree: &BrickTree, scene: &Scene, bricks: &[BrickId]) -> Vec<UVec3> {
+    let order = back_to_front(tree.layout(), tree.grid(), &scene.camera, bricks);
+    order.into_iter().map(|i| bricks[i].coords << u32::from(bricks[i].level.0)).collect()
 }
 
 /// Without skipping, bricks outside the view are kept, too.
@@ -111,6 +131,15 @@ fn view(scene: &Scene) -> View {
         Skipping::Off => Culling::Off,
     };
     View { camera: scene.camera, size: scene.size, culling }
+}
+
+fn check_technique(scene: &Scene) -> Result<(), PrepareError> {
+    match (scene.technique, scene.placement, scene.division) {
+        (Technique::RayCasting, ..) => Ok(()),
+        (_, Placement::Shells, _) => Err(PrepareError::RoundPolygons),
+        (_, _, Division::Ray) => Err(PrepareError::PolygonsOfRays),
+        (_, _, Division::Brick) => Ok(()),
+    }
 }
 
 fn check_size(size: UVec2) -> Result<(), PrepareError> {

@@ -2,7 +2,7 @@
 
 use brickfield_core::glam::UVec2;
 use brickfield_core::{Aabb, Camera, TransferFunction};
-use brickfield_frame::{Division, Lengths, Mode, Placement};
+use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
 use brickfield_lod::Criterion;
 use brickfield_optics::QuadratureRule;
 
@@ -27,12 +27,26 @@ pub struct Scene {
     pub division: Division,
     /// For which length the light through a sample is computed.
     pub lengths: Lengths,
-    /// Which resolution each part is drawn from.
-    pub detail: Criterion,
+    /// Which resolution each part is drawn from: the coarsest that satisfies all; none asks for the coarsest of all.
+    pub detail: Vec<Criterion>,
     /// The part of the volume that is shown, in index space; `None` is all of it.
     pub clip: Option<Aabb>,
     /// Whether transparent bricks are left out.
     pub skipping: Skipping,
+    /// How backends that can do both make the picture.
+    pub technique: Technique,
+}
+
+/// How the samples of a frame are made into a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Technique {
+    /// Rays are cast, front to back.
+    #[default]
+    RayCasting,
+    /// Polygons between which the same segments lie are rasterised and blended, back to front (LaMar, Hamann and Joy 1999,
+    /// section 4.2). They are clipped to bricks: for [`Division::Brick`], and surfaces with facets. The cpu backend casts rays
+    /// to the same samples.
+    Polygons(Target),
 }
 
 /// Whether bricks that contribute nothing are left out.
@@ -58,9 +72,10 @@ impl Scene {
             placement: Placement::Shells,
             division: Division::Ray,
             lengths: Lengths::True,
-            detail: Criterion::FullResolution,
+            detail: vec![Criterion::FullResolution],
             clip: None,
             skipping: Skipping::On,
+            technique: Technique::RayCasting,
         }
     }
 }

@@ -62,8 +62,17 @@ fn a_picture_is_written_and_what_the_volume_lacks_is_said() {
     assert_eq!(image::open(place.path().join("a.png")).unwrap().width(), 8);
 }
 
+#[test]
+fn criteria_are_listed_or_repeated() {
+    let place = Place::new();
+    let said = |lod: &str| text(&place.run(&format!("render|a.nrrd|-o|a.png|--backend|cpu|--size|8x6|{lod}")).stderr);
+    let both = said("--lod|7,error=2.5,poi=-1:2:3:0.5|--lod|9,fov,distance=2");
+    assert!(both.contains("--lod 7: the volume has") && both.contains("--lod 9: the volume has"), "{both}");
+    assert!(!both.contains("error:"), "{both}");
+}
+
 /// Arguments after `render`, the status, and what the message must hold.
-const REFUSED: [(&str, i32, &str); 19] = [
+const REFUSED: [(&str, i32, &str); 25] = [
     ("b.nrrd|-o|a.png", 1, "b.nrrd"),
     ("a.nrrd|-o|a.jpg", 2, "a.jpg: pictures are written as .exr or .png"),
     ("a.nrrd|-o|no/a.png", 2, "no/a.png: there is no folder no"),
@@ -72,6 +81,12 @@ const REFUSED: [(&str, i32, &str); 19] = [
     ("a.nrrd|-o|a.png|--step|-1", 2, "above 0"),
     ("a.nrrd|-o|a.png|--step|nan", 2, "above 0"),
     ("a.nrrd|-o|a.png|--step|1e-9", 2, "segments"),
+    ("a.nrrd|-o|a.png|--lod|finest", 2, "\"finest\" is not full, a level 0 to 31"),
+    ("a.nrrd|-o|a.png|--lod|-1", 2, "\"-1\" is not full, a level 0 to 31"),
+    ("a.nrrd|-o|a.png|--lod|1,error", 2, "error=\"\" is not a finite number above 0"),
+    ("a.nrrd|-o|a.png|--lod|fov=0", 2, "fov=\"0\" is not a finite number above 0"),
+    ("a.nrrd|-o|a.png|--lod|distance=inf", 2, "distance=\"inf\" is not a finite number above 0"),
+    ("a.nrrd|-o|a.png|--lod|poi=1:2", 2, "poi=\"1:2\" is not X:Y:Z in world units"),
     ("a.nrrd|-o|a.png|--size|0x0", 2, "each 1 to 32768"),
     ("a.nrrd|-o|a.png|--camera|fov=500", 2, "fov=\"500\" is not above 0 and below 180 degrees"),
     ("a.nrrd|-o|a.png|--camera|zoom=1e300", 2, "zoom"),

@@ -1,7 +1,7 @@
 //! Random layouts, grids, cameras and criteria.
 
 use brickfield_core::glam::{DMat3, DVec3, UVec2, UVec3};
-use brickfield_core::{BrickLayout, BrickSide, Camera, Grid, IndexPos, Level, Projection};
+use brickfield_core::{BrickLayout, BrickSide, Camera, Grid, IndexPos, Level, Projection, WorldPos};
 use brickfield_lod::{Criterion, Culling, View};
 use proptest::prelude::*;
 
@@ -75,10 +75,21 @@ pub(crate) fn scene(culling: Culling) -> impl Strategy<Value = Scene> {
     })
 }
 
+/// A criterion of each kind, with tolerances about where the answers change; points in units of a world of size 100.
 pub(crate) fn criterion() -> impl Strategy<Value = Criterion> {
+    let factor = || 0.0..5.0;
     prop_oneof![
         Just(Criterion::FullResolution),
         (0u8..12).prop_map(|l| Criterion::Uniform(Level(l))),
-        (0.0..5.0).prop_map(|factor| Criterion::Distance { factor }),
+        factor().prop_map(|factor| Criterion::Distance { factor }),
+        (vector(-100.0..200.0), factor())
+            .prop_map(|(point, factor)| Criterion::DistanceFrom { point: WorldPos(point), factor }),
+        (0.0..1.2).prop_map(|fraction| Criterion::FieldOfView { fraction }),
+        (0.0..6.0).prop_map(|log: f64| Criterion::ScreenSpaceError { pixels: 10f64.powf(log - 3.0) }),
     ]
+}
+
+/// None, one, or several that must all be satisfied.
+pub(crate) fn criteria() -> impl Strategy<Value = Vec<Criterion>> {
+    proptest::collection::vec(criterion(), 0..4)
 }

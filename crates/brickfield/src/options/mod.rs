@@ -53,9 +53,13 @@ pub struct ViewOptions {
     #[arg(long, value_name = "TF", default_value = "auto", help = transfer_help())]
     #[allow(missing_docs)]
     pub transfer: String,
-    /// Which resolution: "full", a level (0 is the finest), or "distance[=FACTOR]" (finer the nearer)
-    #[arg(long, value_name = "LOD", default_value = "full", value_parser = values::detail)]
-    pub lod: Criterion,
+    /// Which resolution; of several, separated by commas or each with its own --lod, all must be satisfied:
+    /// full, a level (0 is the finest), distance[=FACTOR] (a part's distance from the eye above FACTOR diagonals, 1),
+    /// poi=X:Y:Z[:FACTOR] (its distance from a point of the world), fov[=FRACTION] (its angle below FRACTION of the
+    /// field of view, 0.5), error=PIXELS (its voxels at most so large in the picture)
+    #[arg(long, value_name = "LOD", default_value = "full", value_delimiter = ',', value_parser = values::criterion,
+          allow_hyphen_values = true)]
+    pub lod: Vec<Criterion>,
     /// Show only a part, in voxels: X0:X1,Y0:Y1,Z0:Z1
     #[arg(long, value_name = "BOX", value_parser = values::clip, allow_hyphen_values = true)]
     pub clip: Option<Aabb>,
@@ -223,15 +227,12 @@ impl ViewOptions {
     pub fn scene(&self, subject: &Subject) -> Result<Scene, OptionError> {
         let (grid, layout) = (subject.tree.grid(), subject.tree.layout());
         let camera = self.camera.camera(grid, subject.frame, self.size)?;
-        if let (Criterion::Uniform(Level(level)), Level(root)) = (self.lod, layout.root().level)
-            && level > root
-        {
-            note(&format!("--lod {level}: the volume has levels 0 to {root}; level {root} is shown"));
-        }
+        note_missing_levels(&self.lod, layout.root().level);
         if let Some(clip) = self.clip {
             check_clip(clip, grid)?;
         }
-        Ok(Scene { detail: self.lod, clip: self.clip, ..Scene::new(camera, self.size, subject.transfer.clone()) })
+        let scene = Scene::new(camera, self.size, subject.transfer.clone());
+        Ok(Scene { detail: self.lod.clone(), clip: self.clip, ..scene })
     }
 }
 
@@ -244,6 +245,17 @@ impl SamplingOptions {
             mode: self.mode,
             skipping: if self.no_skip { Skipping::Off } else { Skipping::On },
             ..scene
+        }
+    }
+}
+
+/// Says which levels the volume does not have.
+fn note_missing_levels(criteria: &[Criterion], Level(root): Level) {
+    for criterion in criteria {
+        if let Criterion::Uniform(Level(level)) = criterion
+            && *level > root
+        {
+            note(&format!("--lod {level}: the volume has levels 0 to {root}; level {root} is shown"));
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use brickfield_bricks::Downsampling;
 use brickfield_core::glam::{DVec3, UVec2};
-use brickfield_core::{Aabb, BrickSide, Level, ScalarType};
+use brickfield_core::{Aabb, BrickSide, Level, ScalarType, WorldPos};
 use brickfield_frame::Mode;
 use brickfield_io::{ByteOrder, RawSpec};
 use brickfield_lod::Criterion;
@@ -62,19 +62,44 @@ pub fn downsampling(text: &str) -> Result<Downsampling, String> {
     }
 }
 
-/// Which resolution.
-pub fn detail(text: &str) -> Result<Criterion, String> {
-    match text {
-        "full" => return Ok(Criterion::FullResolution),
-        "distance" => return Ok(Criterion::Distance { factor: 1.0 }),
-        _ => {}
+/// One criterion of which resolution is drawn.
+pub fn criterion(text: &str) -> Result<Criterion, String> {
+    let (name, value) = text.trim().split_once('=').map_or((text.trim(), None), |(name, value)| (name, Some(value)));
+    let bounded = |default: Option<f64>| match (value, default) {
+        (None, Some(default)) => Ok(default),
+        (value, _) => positive(value.unwrap_or_default()).map_err(|_| above_0(name, value.unwrap_or_default())),
+    };
+    match (name, value) {
+        ("full", None) => Ok(Criterion::FullResolution),
+        ("distance", _) => Ok(Criterion::Distance { factor: bounded(Some(1.0))? }),
+        ("poi", _) => point_of_interest(value.unwrap_or_default()),
+        ("fov", _) => Ok(Criterion::FieldOfView { fraction: bounded(Some(0.5))? }),
+        ("error", _) => Ok(Criterion::ScreenSpaceError { pixels: bounded(None)? }),
+        _ => level(text),
     }
-    if let Some(factor) = text.strip_prefix("distance=") {
-        let factor = factor.parse::<f64>().ok().filter(|f| *f > 0.0);
-        return factor.map(|factor| Criterion::Distance { factor }).ok_or_else(|| "a factor above 0".to_owned());
+}
+
+fn above_0(name: &str, value: &str) -> String {
+    format!("{name}={value:?} is not a finite number above 0")
+}
+
+fn point_of_interest(text: &str) -> Result<Criterion, String> {
+    let numbers = numbers::<4>(text, ':').or_else(|| numbers::<3>(text, ':').map(|[x, y, z]| [x, y, z, 1.0]));
+    match numbers {
+        Some([x, y, z, factor]) if factor > 0.0 => {
+            Ok(Criterion::DistanceFrom { point: WorldPos(DVec3::new(x, y, z)), factor })
+        }
+        _ => Err(format!("poi={text:?} is not X:Y:Z in world units, or X:Y:Z:FACTOR with FACTOR above 0")),
     }
-    let level = text.parse::<u8>().ok().filter(|l| *l < 32);
-    level.map(|l| Criterion::Uniform(Level(l))).ok_or_else(|| "full, a level 0 to 31, or distance[=FACTOR]".to_owned())
+}
+
+fn level(text: &str) -> Result<Criterion, String> {
+    let level = text.trim().parse::<u8>().ok().filter(|l| *l < 32);
+    level.map(|l| Criterion::Uniform(Level(l))).ok_or_else(|| {
+        format!(
+            "{text:?} is not full, a level 0 to 31, distance[=FACTOR], poi=X:Y:Z[:FACTOR], fov[=FRACTION] or error=PIXELS"
+        )
+    })
 }
 
 /// A clip box in index space.

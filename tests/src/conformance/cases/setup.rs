@@ -73,7 +73,7 @@ impl Setup {
     pub(super) fn detail(mut self, detail: Criterion, downsampling: Downsampling) -> Setup {
         self.oracle = OracleKind::None;
         self.downsampling = downsampling;
-        self.with(|s| s.detail = detail)
+        self.with(|s| s.detail = vec![detail])
     }
 
     /// Draws from coarser levels a field that they reproduce.
