@@ -5,7 +5,7 @@ use std::fmt;
 
 use brickfield::bricks::BrickTree;
 use brickfield::frame::{FramePlan, ShaderFunction};
-use brickfield::{PrepareError, Residency, Scene, Skipping, prepare};
+use brickfield::{PrepareError, Residency, Scene, Skipping, Technique, prepare};
 use brickfield_core::Volume;
 
 use super::plan_mutants::PlanMutant;
@@ -109,7 +109,7 @@ pub struct Point {
 pub struct Plans {
     /// What backends replay.
     pub replayed: FramePlan,
-    /// The same frame without skipping: what the replayed one must look like.
+    /// The same frame without skipping, by casting rays: what the replayed one must look like.
     pub complete: FramePlan,
 }
 
@@ -119,7 +119,8 @@ impl Subject {
     /// # Errors
     /// What `prepare` refuses.
     pub fn plans(&self) -> Result<Plans, PrepareError> {
-        let complete = Scene { skipping: Skipping::Off, ..self.scene.clone() };
+        let technique = Technique::RayCasting;
+        let complete = Scene { skipping: Skipping::Off, technique, ..self.scene.clone() };
         Ok(Plans {
             replayed: prepare(&self.tree, &self.scene, &mut Residency::default())?,
             complete: prepare(&self.tree, &complete, &mut Residency::default())?,

@@ -177,7 +177,7 @@ fn run_picture(
     // Rules of thumb that hold whatever the reference says; a mutant is caught by them, too.
     verdict.complaint = verdict
         .complaint
-        .or_else(|| bounded(&image, &plans.complete.transfer))
+        .or_else(|| bounded(&image, &plans.replayed, reference))
         .or_else(|| empty().filter(|_| mutant.is_none()));
     Judged::Picture(image, verdict)
 }

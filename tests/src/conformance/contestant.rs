@@ -87,7 +87,11 @@ impl Contestant {
 
     /// Whether a mutant can be run on this backend.
     pub fn can_run(&self, mutant: &Mutant) -> bool {
-        self.opened.is_ok() && (self.has_shaders() || matches!(mutant, Mutant::Plan(_)))
+        let needs_shaders = match mutant {
+            Mutant::Plan(plan) => plan.is_of_polygons(),
+            Mutant::Shader(_) => true,
+        };
+        self.opened.is_ok() && (self.has_shaders() || !needs_shaders)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use brickfield::frame::{
-    Beams, BrickSet, Decode, Feature, FramePlan, IndexEntry, Mode, Overview, SampleFormat, Sampling,
+    Beams, BrickSet, Decode, Feature, FramePlan, IndexEntry, Mode, Overview, ProxyCorner, ProxyGeometry, SampleFormat, Sampling,
 };
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, Knot, Level, TransferFunction};
@@ -70,11 +70,19 @@ pub enum PlanMutant {
     ClipIgnored,
     /// Transparent blocks show a brick of the greatest value.
     GhostBricks,
+    /// Polygons are drawn front to back.
+    PolygonsReversed,
+    /// Every ninetieth triangle is missing.
+    PolygonsMissing,
+    /// The faces through which rays leave bricks are not drawn.
+    ExitsMissing,
+    /// Of three stacks of planes, those across z are missing.
+    StackMissing,
 }
 
 impl PlanMutant {
     /// All plan mutants.
-    pub const ALL: [PlanMutant; 29] = [
+    pub const ALL: [PlanMutant; 33] = [
         PlanMutant::AnchorHalfVoxel,
         PlanMutant::PixelCorner,
         PlanMutant::RowsFlipped,
@@ -104,6 +112,10 @@ impl PlanMutant {
         PlanMutant::BehindTheEye,
         PlanMutant::ClipIgnored,
         PlanMutant::GhostBricks,
+        PlanMutant::PolygonsReversed,
+        PlanMutant::PolygonsMissing,
+        PlanMutant::ExitsMissing,
+        PlanMutant::StackMissing,
     ];
 
     /// The mutant's name in reports.
@@ -138,7 +150,17 @@ impl PlanMutant {
             PlanMutant::BehindTheEye => "plan/behind-the-eye",
             PlanMutant::ClipIgnored => "plan/clip-ignored",
             PlanMutant::GhostBricks => "plan/ghost-bricks",
+            PlanMutant::PolygonsReversed => "plan/polygons-reversed",
+            PlanMutant::PolygonsMissing => "plan/polygons-missing",
+            PlanMutant::ExitsMissing => "plan/exits-missing",
+            PlanMutant::StackMissing => "plan/stack-missing",
         }
+    }
+
+    /// Whether it is in the polygons, which only backends with a rasteriser draw.
+    pub fn is_of_polygons(self) -> bool {
+        use PlanMutant::{ExitsMissing, PolygonsMissing, PolygonsReversed, StackMissing};
+        matches!(self, PolygonsReversed | PolygonsMissing | ExitsMissing | StackMissing)
     }
 
     /// The plan with this thing wrong.
@@ -190,6 +212,12 @@ impl PlanMutant {
                 plan.visible = plan.domain;
             }
             PlanMutant::GhostBricks => show_ghosts(plan),
+            PlanMutant::PolygonsReversed => edit_triangles(plan, |_, triangles| triangles.reverse()),
+            PlanMutant::PolygonsMissing => edit_triangles(plan, |_, triangles| {
+                triangles.iter_mut().step_by(90).for_each(|t| *t = [0; 3]);
+            }),
+            PlanMutant::ExitsMissing => drop_triangles(plan, |corner| corner.surface == ProxyCorner::EXIT),
+            PlanMutant::StackMissing => drop_triangles(plan, |corner| corner.owner / 2 == 2),
         }
     }
 }
@@ -201,6 +229,21 @@ fn trace_beams(plan: &mut FramePlan) {
     if plan.beams.is_none() {
         plan.features = plan.features.without(Feature::SkipBesideBeams);
     }
+}
+
+fn edit_triangles(plan: &mut FramePlan, edit: impl Fn(&[ProxyCorner], &mut [[u32; 3]])) {
+    let Some(proxy) = &mut plan.proxy else { return };
+    let mut spoilt = ProxyGeometry::clone(proxy);
+    let corners = spoilt.corners().to_vec();
+    edit(&corners, spoilt.indices_mut().as_chunks_mut().0);
+    *proxy = Arc::new(spoilt);
+}
+
+fn drop_triangles(plan: &mut FramePlan, is_dropped: impl Fn(&ProxyCorner) -> bool) {
+    edit_triangles(plan, |corners, triangles| {
+        let dropped = triangles.iter_mut().filter(|t| is_dropped(&corners[t[0] as usize]));
+        dropped.for_each(|t| *t = [0; 3]);
+    });
 }
 
 fn shift_half_pixel(plan: &mut FramePlan) {

@@ -6,10 +6,14 @@
 //!
 //! **Fast mode** adds, per pixel, what hardware filtering may do (`filter`) and, where a ray may end early, the
 //! transmittance floor: that is the most that any channel can lose behind the point where it ends.
+//! **Polygons** are blended: of each segment that a ray sees, three roundings remain, of 1 - alpha, of its product with what lies
+//! behind and of the sum, each of at most the target's unit roundoff (2^-24, or 2^-11 for 16-bit floats, which round once).
+//! What is blended is at most 1, and what comes before only dims it: so both bounds are wider by three (one) of them a segment.
+//!
 //! A tolerance so wide that the picture could be anything is no test: see [`Tolerance::is_empty_promise`].
 
 use brickfield::cpu::Discrete;
-use brickfield::frame::{Capabilities, Division, FramePlan, Lengths, Mode};
+use brickfield::frame::{Capabilities, Division, FramePlan, Lengths, Mode, Target};
 use brickfield_core::glam::UVec2;
 use brickfield_core::{Image, TransferFunction};
 
@@ -79,7 +83,10 @@ impl Tolerance {
     /// Rays that are too long for any rule.
     pub fn of(plan: &FramePlan, reference: &Discrete, device: &Capabilities) -> Result<Tolerance, Complaint> {
         let most = most_difference(plan)?;
-        let exact = |bound: f64| reference.ambiguity.iter().map(|a| bound + a).collect::<Vec<f64>>();
+        let blended = blending(plan, reference);
+        let exact = |bound: f64| {
+            reference.ambiguity.iter().zip(&blended).map(|(a, b)| bound + a + b).collect::<Vec<f64>>()
+        };
         let Mode::Fast { transmittance_floor } = plan.sampling.mode() else {
             return Ok(Tolerance { most: exact(most), bulk: exact(BULK_BOUND) });
         };
@@ -129,16 +136,24 @@ impl Tolerance {
 }
 
 /// What holds for every picture, whatever its reference: 0 <= alpha <= 1, and colours within alpha times the transfer
-/// function's greatest, to rounding.
-pub(crate) fn bounded(image: &Image<f32>, transfer: &TransferFunction) -> Option<Complaint> {
+/// function's greatest, to rounding: that of f32, and of what pixels are blended in.
+pub(crate) fn bounded(image: &Image<f32>, plan: &FramePlan, reference: &Discrete) -> Option<Complaint> {
+    let rounding = match plan.proxy.as_ref().map(|proxy| proxy.target()) {
+        None | Some(Target::Float32) => 0.0,
+        Some(Target::Float16) => blending(plan, reference).into_iter().fold(0.0, f64::max),
+    };
+    within_hull(image, &plan.transfer, rounding)
+}
+
+fn within_hull(image: &Image<f32>, transfer: &TransferFunction, rounding: f64) -> Option<Complaint> {
     let greatest = |c: usize| transfer.knots().iter().map(|k| k.color[c]).fold(0.0, f64::max);
     let hull = [greatest(0), greatest(1), greatest(2)];
     let wrong = |p: &[f32; 4]| {
         let [r, g, b, a] = p.map(f64::from);
-        let within = |(c, h): (f64, f64)| (-1e-6..=a * h * (1.0 + 1e-5) + 1e-5).contains(&c);
+        let within = |(c, h): (f64, f64)| (-1e-6..=a * h * (1.0 + 1e-5) + 1e-5 + rounding).contains(&c);
         match () {
             () if p.iter().any(|v| !v.is_finite()) => Some("a channel is not finite"),
-            () if !(-1e-6..=1.0 + 1e-6).contains(&a) => Some("alpha is not within 0 and 1"),
+            () if !(-1e-6..=1.0 + 1e-6 + rounding).contains(&a) => Some("alpha is not within 0 and 1"),
             () if ![r, g, b].into_iter().zip(hull).all(within) => Some("a colour is outside the transfer function's"),
             () => None,
         }
@@ -164,6 +179,16 @@ fn most_difference(plan: &FramePlan) -> Result<f64, Complaint> {
         2049..=MOST_SAMPLES => Ok(2.5e-4),
         n_samples => Err(Complaint::NoRule { n_samples }),
     }
+}
+
+/// What blending polygons may change in each pixel; 0 where rays are cast.
+fn blending(plan: &FramePlan, reference: &Discrete) -> Vec<f64> {
+    let rounding = match plan.proxy.as_ref().map(|proxy| proxy.target()) {
+        None => 0.0,
+        Some(Target::Float32) => 3.0 * (-24f64).exp2(),
+        Some(Target::Float16) => (-11f64).exp2(),
+    };
+    reference.visible_segments.iter().map(|n| rounding * f64::from(*n)).collect()
 }
 
 /// Most samples on any ray: the domain's diagonal in steps, along the direction that is slowest through it.
@@ -229,7 +254,7 @@ mod tests {
     fn what_is_not_a_picture_fails() {
         assert!(matches!(complaint(&tolerance(None), f64::NAN, 1), Some(Complaint::NotComparable(_))));
         let transfer = TransferFunction::constant(1.0, [0.9, 0.3, 0.1]).unwrap();
-        let pixel = |p: [f32; 4]| bounded(&Image::new(UVec2::ONE, vec![p]).unwrap(), &transfer).is_none();
+        let pixel = |p: [f32; 4]| within_hull(&Image::new(UVec2::ONE, vec![p]).unwrap(), &transfer, 0.0).is_none();
         assert!(pixel([0.0; 4]) && pixel([0.45, 0.15, 0.05, 0.5]));
         assert!(!pixel([0.5, 0.0, 0.0, 0.5]) && !pixel([0.0, 0.0, 0.0, 1.1]) && !pixel([-0.1, 0.0, 0.0, 0.5]));
     }

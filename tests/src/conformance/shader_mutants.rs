@@ -133,6 +133,16 @@ mutants! {
     /// Nominal lengths have the angle's stretch.
     NOMINAL_STRETCHED: "nominal-stretched", "segments",
         "fn nominal_length(ray: Ray) -> f32 {\n    return frame.direction_right.w;" => "fn nominal_length(ray: Ray) -> f32 {\n    return ray.step;";
+    /// The same, in bricks with segments of their own.
+    NOMINAL_STRETCHED_IN_BRICKS: "nominal-stretched-in-bricks", "segments",
+        "return frame.direction_right.w * ray.coarseness;" => "return ray.step;";
+    /// The segments of polygons begin at the surface before, even outside of the brick.
+    POLYGON_NOT_CUT: "polygon-not-cut", "proxy", "let start = max(span.start, near);" => "let start = near;";
+    /// The last segment of a brick begins a surface too early.
+    LAST_SURFACE_BESIDE: "last-surface-beside", "proxy", "let k = ceil(segments_before(ray, span.end)) - 1.0;\n    // The quotient is corrected by looking.\n    return select("
+        => "let k = ceil(segments_before(ray, span.end)) - 2.0;\n    return k; return select(";
+    /// Polygons show the brick that is drawn before theirs.
+    FOREIGN_BRICK: "foreign-brick", "proxy", "drawn[polygon.brick]" => "drawn[max(polygon.brick, 1u) - 1u]";
     /// Planes parallel to the picture are as far apart on every ray.
     PLANES_NOT_STRETCHED: "planes-not-stretched", "rays", "ray.step = frame.direction_right.w * length;"
         => "ray.step = frame.direction_right.w;";

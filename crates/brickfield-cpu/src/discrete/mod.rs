@@ -33,6 +33,8 @@ pub struct Discrete {
     pub n_samples: u64,
     /// Those of them whose extinction is above 0.
     pub n_visible_samples: u64,
+    /// For each pixel, rows from the top: the segments whose depth is above 0.
+    pub visible_segments: Vec<u32>,
 }
 
 /// The sum that `plan` asks for, in f64.
@@ -61,6 +63,7 @@ struct Pixel {
     ambiguity: f64,
     n_samples: u64,
     n_visible_samples: u64,
+    n_visible_segments: u32,
 }
 
 fn render<S: Stored>(plan: &FramePlan) -> Discrete {
@@ -79,6 +82,7 @@ fn render<S: Stored>(plan: &FramePlan) -> Discrete {
         ambiguity: pixels().map(|p| p.ambiguity).collect(),
         n_samples: pixels().map(|p| p.n_samples).sum(),
         n_visible_samples: pixels().map(|p| p.n_visible_samples).sum(),
+        visible_segments: pixels().map(|p| p.n_visible_segments).collect(),
     }
 }
 
@@ -101,6 +105,7 @@ fn along<S: Stored>(field: &Field<S>, ray: &PlanRay) -> Pixel {
         let segment = segment(plan, values, part.length);
         if segment.depth > 0.0 {
             pixel.n_visible_samples += n_visible(field, &values);
+            pixel.n_visible_segments += 1;
             state.push(segment);
         }
     }

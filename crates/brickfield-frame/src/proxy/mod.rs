@@ -54,15 +54,14 @@ pub struct ProxyCorner {
     pub surface: f32,
     /// Place in [`ProxyGeometry::bricks`].
     pub brick: u32,
-    /// The facet or stack of planes that the surface belongs to; [`ProxyCorner::ANY`] if rays of all of them may meet it.
+    /// What else a ray must meet for its fragment to count: the facet or stack of planes that the surface belongs to; the exit
+    /// itself, twice its axis, plus one for the upper face.
     pub owner: u32,
 }
 
 impl ProxyCorner {
     /// The surface number of a brick's faces.
     pub const EXIT: f32 = -1.0;
-    /// The owner of what belongs to none.
-    pub const ANY: u32 = u32::MAX;
 }
 
 impl Target {
@@ -169,6 +168,11 @@ impl ProxyGeometry {
     /// Triangles: three corners each, in drawing order.
     pub fn indices(&self) -> &[u32] {
         &self.indices
+    }
+
+    /// The triangles, to change some (a mutant in conformance runs does).
+    pub fn indices_mut(&mut self) -> &mut [u32] {
+        &mut self.indices
     }
 
     /// Ranges of [`indices`](Self::indices), to be drawn one after the other so that no draw lasts long enough for a driver to end it.

@@ -72,12 +72,12 @@ fn exits(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Outline> 
     let forward = plan.rays.direction[0];
     let leaves_up = |axis: usize| projector.eye().map_or(forward[axis] > 0.0, |eye| eye[axis] < b.max[axis]);
     let leaves_down = |axis: usize| projector.eye().map_or(forward[axis] < 0.0, |eye| eye[axis] > b.min[axis]);
-    let up = (0..3).filter(|axis| leaves_up(*axis)).map(|axis| face(b, axis, b.max[axis]));
-    let down = (0..3).filter(|axis| leaves_down(*axis)).map(|axis| face(b, axis, b.min[axis]));
-    let outline = |polygon: Vec<DVec3>| Outline {
+    let up = (0..3).filter(|axis| leaves_up(*axis)).map(|axis| (2 * axis + 1, face(b, axis, b.max[axis])));
+    let down = (0..3).filter(|axis| leaves_down(*axis)).map(|axis| (2 * axis, face(b, axis, b.min[axis])));
+    let outline = |(owner, polygon): (usize, Vec<DVec3>)| Outline {
         points: projector.project(&polygon),
         surface: ProxyCorner::EXIT,
-        owner: ProxyCorner::ANY,
+        owner: owner as u32,
     };
     up.chain(down).map(outline).collect()
 }

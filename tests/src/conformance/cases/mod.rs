@@ -7,6 +7,7 @@ mod functions;
 mod levels;
 mod pictures;
 mod placements;
+mod polygons;
 mod real;
 mod setup;
 mod views;
@@ -21,6 +22,7 @@ pub fn all() -> Vec<Case> {
         views::cases(),
         levels::cases(),
         placements::cases(),
+        polygons::cases(),
         fast::cases(),
         extremes::cases(),
         real::cases(),

@@ -1,0 +1,147 @@
+//! Every segment of every ray is one fragment of one polygon of its own, and they are drawn from back to front.
+
+mod support;
+
+use brickfield_core::glam::{DVec2, DVec3, UVec2, UVec3};
+use brickfield_core::{BrickLayout, BrickSide, Camera, Level, Projection, ScalarType, TransferFunction};
+use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, Placement, ProxyCorner, ProxyGeometry, Target};
+use proptest::prelude::*;
+use support::Setup;
+
+/// What a fragment stands for: a brick's segment that ends at a surface, or with the brick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Fragment {
+    brick: u32,
+    surface: f32,
+    owner: u32,
+}
+
+/// The fragments that cover a point of the picture, in drawing order.
+fn fragments(proxy: &ProxyGeometry, at: DVec2) -> Vec<Fragment> {
+    let corner = |i: u32| proxy.corners()[i as usize];
+    let place = |c: ProxyCorner| DVec2::new(c.pixel[0].into(), c.pixel[1].into());
+    let covering = proxy.indices().chunks_exact(3).filter(|t| {
+        let [a, b, c] = [0, 1, 2].map(|i| place(corner(t[i])));
+        let sides = [(a, b), (b, c), (c, a)].map(|(p, q)| (q - p).perp_dot(at - p));
+        sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0)
+    });
+    let fragment = |t: &[u32]| {
+        let ProxyCorner { brick, surface, owner, .. } = corner(t[0]);
+        Fragment { brick, surface, owner }
+    };
+    let mut found: Vec<Fragment> = covering.map(fragment).collect();
+    // A point on an edge between two triangles of a fan is one fragment of a rasteriser.
+    found.dedup();
+    found
+}
+
+/// The far ends of a ray's segments in the bricks, from back to front: brick, and surface.
+fn expected(plan: &FramePlan, cells: &[UVec3], x: u32, y: u32) -> Vec<(u32, f32, f64)> {
+    let ray = plan.rays.ray(x, y);
+    let n = f64::from(plan.bricks.side().n_cells());
+    let mut ends = Vec::new();
+    for (brick, cell) in cells.iter().enumerate() {
+        let level = u32::from(plan.index.at(*cell).level().0);
+        let low = *cell >> level << level;
+        let high = low + (1 << level);
+        let (mut start, mut end) = (ray.t_eye, f64::INFINITY);
+        for axis in 0..3 {
+            let first = if low[axis] == 0 { plan.domain.min[axis] } else { f64::from(low[axis]) * n };
+            let last =
+                if high[axis] >= plan.index.dims()[axis] { plan.domain.max[axis] } else { f64::from(high[axis]) * n };
+            let at = |face: f64| (face - plan.rays.center[axis] - ray.anchor[axis]) / ray.direction[axis] + ray.t_anchor;
+            start = start.max(at(first).min(at(last)));
+            end = end.min(at(first).max(at(last)));
+        }
+        let step = plan.sampling.step_world() * ray.stretch * f64::from(1 << level);
+        // Nothing that a rounding could take away.
+        if end - start < 1e-6 {
+            continue;
+        }
+        if plan.sampling.lengths() == Lengths::True {
+            ends.push((brick as u32, ProxyCorner::EXIT, end));
+        }
+        let shift = if plan.sampling.lengths() == Lengths::True { 0.0 } else { 0.5 };
+        for k in (start / step - shift).ceil() as i64..=(end / step - shift).floor() as i64 {
+            let t = (k as f64 + shift) * step;
+            if t > start + 1e-6 && t < end - 1e-6 {
+                ends.push((brick as u32, k as f32, t));
+            }
+        }
+    }
+    ends.sort_by(|a, b| b.2.total_cmp(&a.2));
+    ends
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    #[test]
+    fn every_segment_is_one_fragment_and_the_far_ones_come_first(
+        eye in prop::array::uniform3(-0.6f64..1.6),
+        target in prop::array::uniform3(0.2f64..0.8),
+        fov_y in 0.3f64..2.8,
+        parallel in any::<bool>(),
+        placement in 0usize..3,
+        nominal in any::<bool>(),
+        seed in any::<u32>(),
+        step_world in 0.9f64..5.0,
+    ) {
+        let volume = support::volume([50, 40, 34], DVec3::new(1.0, 1.2, 0.7), ScalarType::U8, |_| 100.0);
+        let b = volume.grid().world_box();
+        let at = |p: [f64; 3]| b.min + b.extent() * DVec3::from(p);
+        prop_assume!(at(eye).distance(at(target)) > 1.0);
+        let projection = match parallel {
+            true => Projection::Orthographic { height: 40.0 },
+            false => Projection::Perspective { fov_y },
+        };
+        let Ok(camera) = Camera::look_at(at(eye), at(target), DVec3::new(0.1, 0.2, 1.0), projection) else { return Ok(()) };
+        let level = |cell: UVec3| ((cell.x * 7 + cell.y * 13 + cell.z * 29 + seed) % 3) as u8;
+        let placements =
+            [Placement::TessellatedShells { facet_pixels: 5 }, Placement::ViewportPlanes, Placement::ObjectPlanes];
+        let plan = Setup {
+            camera,
+            step_world,
+            level: &level,
+            side: BrickSide::S16,
+            size: UVec2::new(17, 13),
+            placement: placements[placement],
+            division: Division::Brick,
+            lengths: if nominal { Lengths::Nominal } else { Lengths::True },
+            ..Setup::new(&volume, TransferFunction::constant(0.1, [1.0; 3]).unwrap())
+        }
+        .plan();
+        let layout = BrickLayout::new(volume.grid().dims(), BrickSide::S16);
+        let is_first = |cell: &UVec3| match plan.index.at(*cell) {
+            IndexEntry::Resident { level, .. } => *cell >> u32::from(level.0) << u32::from(level.0) == *cell,
+            IndexEntry::Transparent { .. } => false,
+        };
+        let cells: Vec<UVec3> = layout.bricks(Level(0)).map(|id| id.coords).filter(is_first).collect();
+        let proxy = ProxyGeometry::of(&plan, &cells, Target::Float32);
+        for (x, y) in (0..13).flat_map(|y| (0..17).map(move |x| (x, y))) {
+            let found = fragments(&proxy, DVec2::new(f64::from(x), f64::from(y)) + 0.5);
+            let mut last = vec![None; cells.len()];
+            for (brick, surface, _) in expected(&plan, &cells, x, y) {
+                let own = |f: &Fragment| {
+                    let owner = match plan.sampling.placement() {
+                        _ if surface == ProxyCorner::EXIT => true,
+                        Placement::TessellatedShells { .. } => f.owner == plan.rays.facet_of(x, y),
+                        Placement::ObjectPlanes => {
+                            let d = plan.rays.ray(x, y).direction;
+                            let axis = plan.rays.planes.axis(d);
+                            f.owner == 2 * axis as u32 + u32::from(d[axis] > 0.0)
+                        }
+                        _ => f.owner == 0,
+                    };
+                    f.brick == brick && f.surface == surface && owner
+                };
+                let places: Vec<usize> = (0..found.len()).filter(|i| own(&found[*i])).collect();
+                let n = places.len();
+                // Faces beside each other cover their common edge both: the shader takes the ray's own.
+                let is_exit = surface == ProxyCorner::EXIT;
+                prop_assert!(n == 1 || (is_exit && n > 1), "pixel ({x}, {y}): {n} fragments of brick {brick}, surface {surface}");
+                let before = last[brick as usize].replace(places[0]);
+                prop_assert!(before.is_none_or(|before| before < places[0]), "pixel ({x}, {y}), brick {brick}: order");
+            }
+        }
+    }
+}

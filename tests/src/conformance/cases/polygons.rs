@@ -1,0 +1,118 @@
+//! Proxy geometry: the same samples through the rasteriser and blending.
+
+use brickfield::Technique;
+use brickfield::bricks::Downsampling;
+use brickfield::frame::{Division, Lengths, Placement, Target};
+use brickfield::lod::Criterion;
+use brickfield_core::glam::DVec3;
+use brickfield_core::{Grid, ScalarType, TransferFunction, Volume};
+use brickfield_optics::QuadratureRule;
+
+use super::fields::{WARM, checkers, grid, hills, skew_grid, soft};
+use super::setup::{Setup, catches, picture};
+use crate::conformance::case::{Case, Mutant};
+use crate::conformance::plan_mutants::PlanMutant::*;
+use crate::conformance::shader_mutants as shader;
+
+const FACETS: Placement = Placement::TessellatedShells { facet_pixels: 12 };
+const PLACEMENTS: [Placement; 3] = [FACETS, Placement::ViewportPlanes, Placement::ObjectPlanes];
+
+pub(super) fn cases() -> Vec<Case> {
+    [plain(), levels(), rules(), views(), nominal(), targets()].into_iter().flatten().collect()
+}
+
+fn large() -> Volume {
+    hills(&Grid::axis_aligned(DVec3::new(71.0, 66.0, 53.0).as_uvec3(), DVec3::ONE).expect("a grid"), ScalarType::U16)
+}
+
+/// A scene of polygons, two voxels apart.
+fn polygons(volume: Volume, transfer: TransferFunction, placement: Placement) -> Setup {
+    Setup::new(volume, transfer).step(2.0).with(|s| {
+        (s.placement, s.division, s.technique) = (placement, Division::Brick, Technique::Polygons(Target::Float32));
+    })
+}
+
+fn each(name: &str, mutants: Vec<Mutant>, setup: impl Fn(Placement) -> Setup + Clone + 'static) -> Vec<Case> {
+    let case = |placement: Placement| {
+        let setup = setup.clone();
+        picture(format!("polygons/{name}-{}", placement.name()), mutants.clone(), move || setup(placement))
+    };
+    PLACEMENTS.into_iter().map(case).collect()
+}
+
+fn plain() -> Vec<Case> {
+    let faces = catches![PolygonsReversed, PolygonsMissing, ExitsMissing, shader::POLYGON_NOT_CUT];
+    let one = each("one-level", faces.clone(), |p| polygons(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), p));
+    let skew = each("skew", catches![PolygonsReversed, shader::LAST_SURFACE_BESIDE], |p| {
+        polygons(hills(&skew_grid(), ScalarType::I16), soft(ScalarType::I16), p)
+    });
+    let skip = each("skip", catches![PolygonsMissing, shader::FOREIGN_BRICK], |p| {
+        polygons(checkers(DVec3::new(71.0, 66.0, 53.0).as_uvec3()), soft(ScalarType::U8), p)
+    });
+    let clip = each("clip", catches![ExitsMissing, ClipIgnored], |p| {
+        polygons(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), p).clip([3.3, 1.1, 4.5], [31.2, 22.7, 26.0])
+    });
+    [one, skew, skip, clip].into_iter().flatten().collect()
+}
+
+fn levels() -> Vec<Case> {
+    let of_levels = |p| {
+        polygons(large(), soft(ScalarType::U16), p)
+            .detail(Criterion::Distance { factor: 1.0 }, Downsampling::Average)
+            .eye(DVec3::new(-6.0, -14.0, 30.0), DVec3::new(35.0, 33.0, 26.0))
+            .step(0.8)
+    };
+    let constant = |p| {
+        polygons(large(), TransferFunction::constant(0.04, WARM).expect("a transfer function"), p)
+            .detail(Criterion::Distance { factor: 1.0 }, Downsampling::Average)
+            .eye(DVec3::new(-6.0, -14.0, 30.0), DVec3::new(35.0, 33.0, 26.0))
+    };
+    let several = each("several-levels", catches![PolygonsReversed, ExitsMissing, shader::STEPS_OF_LEVEL_0], of_levels);
+    several.into_iter().chain(each("constant", catches![PolygonsMissing, ExitsMissing], constant)).collect()
+}
+
+fn rules() -> Vec<Case> {
+    let case = |rule: QuadratureRule| {
+        picture(format!("polygons/rule-{}", rule.name()), catches![PolygonsMissing, ExtinctionScaled], move || {
+            polygons(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), Placement::ObjectPlanes).rule(rule)
+        })
+    };
+    QuadratureRule::ALL.into_iter().map(case).collect()
+}
+
+/// Edge-on, along a diagonal, from inside, through a very wide lens, with parallel rays.
+fn views() -> Vec<Case> {
+    let scene = |p| polygons(large(), soft(ScalarType::U16), p);
+    let center = DVec3::new(35.0, 33.0, 26.0);
+    let along = move |p, direction: DVec3| scene(p).eye(center - direction * 90.0, center);
+    let inside = move |p| scene(p).eye(DVec3::new(21.3, 40.2, 17.9), DVec3::new(60.0, 20.0, 30.0));
+    let on_a_face = move |p| scene(p).eye(DVec3::new(30.5, 45.5, 17.9), DVec3::new(60.0, 20.0, 30.0));
+    let wide = move |p| scene(p).lens(DVec3::new(21.3, 40.2, 17.9), DVec3::new(60.0, 20.0, 30.0), 2.9);
+    let both = || catches![PolygonsReversed, PolygonsMissing, ExitsMissing];
+    let mut cases = each("edge-on", both(), move |p| along(p, DVec3::X));
+    cases.extend(each("along-z", both(), move |p| along(p, DVec3::Z)));
+    cases.extend(each("along-a-diagonal", both(), move |p| along(p, DVec3::new(1.0, 1.0, 0.0).normalize())));
+    cases.extend(each("along-the-space-diagonal", both(), move |p| along(p, DVec3::ONE.normalize())));
+    cases.extend(each("inside", both(), inside));
+    cases.extend(each("eye-on-a-face", both(), on_a_face));
+    cases.extend(each("wide", both(), wide));
+    cases.extend(each("parallel", both(), move |p| scene(p).parallel(DVec3::new(0.5, -1.0, 0.4), 110.0)));
+    cases.extend(each("parallel-edge-on", both(), move |p| scene(p).parallel(DVec3::Y, 110.0)));
+    cases.push(picture("polygons/three-stacks", catches![StackMissing, shader::STACK_FLAT], move || {
+        wide(Placement::ObjectPlanes)
+    }));
+    cases
+}
+
+fn nominal() -> Vec<Case> {
+    each("nominal", catches![PolygonsReversed, PolygonsMissing, shader::NOMINAL_STRETCHED_IN_BRICKS], |p| {
+        polygons(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), p).with(|s| s.lengths = Lengths::Nominal)
+    })
+}
+
+fn targets() -> Vec<Case> {
+    each("rgba16float", catches![PolygonsReversed, ExitsMissing], |p| {
+        polygons(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), p)
+            .with(|s| s.technique = Technique::Polygons(Target::Float16))
+    })
+}
