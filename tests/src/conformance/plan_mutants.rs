@@ -72,7 +72,7 @@ pub enum PlanMutant {
     GhostBricks,
     /// Polygons are drawn front to back.
     PolygonsReversed,
-    /// Every ninetieth triangle is missing.
+    /// Every 31st triangle is missing.
     PolygonsMissing,
     /// The faces through which rays leave bricks are not drawn.
     ExitsMissing,
@@ -214,7 +214,7 @@ impl PlanMutant {
             PlanMutant::GhostBricks => show_ghosts(plan),
             PlanMutant::PolygonsReversed => edit_triangles(plan, |_, triangles| triangles.reverse()),
             PlanMutant::PolygonsMissing => edit_triangles(plan, |_, triangles| {
-                triangles.iter_mut().step_by(90).for_each(|t| *t = [0; 3]);
+                triangles.iter_mut().step_by(31).for_each(|t| *t = [0; 3]);
             }),
             PlanMutant::ExitsMissing => drop_triangles(plan, |corner| corner.surface == ProxyCorner::EXIT),
             PlanMutant::StackMissing => drop_triangles(plan, |corner| corner.owner / 2 == 2),
