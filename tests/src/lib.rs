@@ -5,6 +5,7 @@
 
 pub mod compare;
 pub mod conformance;
+pub mod lamar;
 pub mod metrics;
 pub mod orders;
 pub mod report;

@@ -12,8 +12,8 @@ use brickfield_shaders::{Entry, ShaderLibrary, Variant, passes, pixels_per_pass}
 
 use crate::evaluate::Lists;
 use crate::march::{march, milliseconds_since, read_back, reserve_picture};
-use crate::polygons::{Polygons, reserve_canvas};
 use crate::options::choose;
+use crate::polygons::{Polygons, reserve_canvas};
 use crate::scene::Scene;
 use crate::staging::Staging;
 use crate::variants::Variants;

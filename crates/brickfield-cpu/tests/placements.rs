@@ -84,7 +84,8 @@ fn every_rule_divides_bricks() {
         let setup = Setup { rule, division: Division::Brick, level: &mixed, ..Setup::new(&volume, ramp()) };
         let plan = setup.plan();
         let (expected, got) = (discrete(&plan), CpuBackend::new().render(&plan).unwrap().image.map(f64::from));
-        let worst = got.pixels().iter().zip(expected.image.pixels()).map(|(a, b)| difference(*a, *b)).fold(0.0, f64::max);
+        let worst =
+            got.pixels().iter().zip(expected.image.pixels()).map(|(a, b)| difference(*a, *b)).fold(0.0, f64::max);
         assert!(worst < 2e-5, "{}: {worst:e}", rule.name());
     }
 }

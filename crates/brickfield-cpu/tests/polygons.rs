@@ -49,7 +49,8 @@ fn expected(plan: &FramePlan, cells: &[UVec3], x: u32, y: u32) -> Vec<(u32, f32,
             let first = if low[axis] == 0 { plan.domain.min[axis] } else { f64::from(low[axis]) * n };
             let last =
                 if high[axis] >= plan.index.dims()[axis] { plan.domain.max[axis] } else { f64::from(high[axis]) * n };
-            let at = |face: f64| (face - plan.rays.center[axis] - ray.anchor[axis]) / ray.direction[axis] + ray.t_anchor;
+            let at =
+                |face: f64| (face - plan.rays.center[axis] - ray.anchor[axis]) / ray.direction[axis] + ray.t_anchor;
             start = start.max(at(first).min(at(last)));
             end = end.min(at(first).max(at(last)));
         }

@@ -5,7 +5,10 @@ use std::sync::Arc;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, TransferFunction};
 
-use crate::{Beams, BrickSet, Feature, FeatureSet, IndexGrid, Occupancy, ProxyGeometry, RayFrame, SampleFormat, Sampling, ValueScale};
+use crate::{
+    Beams, BrickSet, Feature, FeatureSet, IndexGrid, Occupancy, ProxyGeometry, RayFrame, SampleFormat, Sampling,
+    ValueScale,
+};
 
 /// Everything that a backend needs for one frame, and nothing that this frame does not need.
 #[derive(Clone, Debug)]

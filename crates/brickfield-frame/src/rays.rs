@@ -146,7 +146,8 @@ impl RayFrame {
         let coarsest = steps.coarsest_world();
         let start = ((nearest / coarsest).floor() * coarsest).max(0.0);
         let n_segments = (farthest(camera, &corners) - start) / steps.step_world;
-        let frame = RayFrame { start, anchor_past_start: depth - start, n_segments: n_segments.ceil().max(1.0), ..frame };
+        let frame =
+            RayFrame { start, anchor_past_start: depth - start, n_segments: n_segments.ceil().max(1.0), ..frame };
         match steps.placement {
             Placement::Shells | Placement::ViewportPlanes => frame,
             Placement::TessellatedShells { .. } => {

@@ -1,11 +1,11 @@
 //! From a variant to a module with nothing in it that the variant does not need.
 
+use naga::Module;
 use naga::back::spv;
 use naga::compact::{KeepUnused, compact};
 use naga::front::wgsl;
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use naga::Module;
 
 use crate::reflect::{Binding, bindings};
 use crate::{ShaderLibrary, Variant};

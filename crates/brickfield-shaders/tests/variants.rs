@@ -12,7 +12,15 @@ fn feature_sets() -> impl Iterator<Item = FeatureSet> {
 
 /// A variant for short rays through samples that are no 16-bit integers.
 fn variant(features: FeatureSet, rule: QuadratureRule, entry: Entry) -> Variant {
-    Variant { features, rule, segments: Segments::default(), search: SEARCH, long_rays: false, integer_samples: false, entry }
+    Variant {
+        features,
+        rule,
+        segments: Segments::default(),
+        search: SEARCH,
+        long_rays: false,
+        integer_samples: false,
+        entry,
+    }
 }
 
 fn compile(variant: &Variant) -> Specialised {

@@ -15,8 +15,8 @@ use crate::buffer::Reused;
 use crate::clock::Clock;
 use crate::device::Device;
 use crate::picture::{self, Maker};
-use crate::polygons::Polygons;
 use crate::pipeline::{Pipeline, Pipelines, Program};
+use crate::polygons::Polygons;
 use crate::scene::{Scene, unbound};
 use crate::{AdapterChoice, OpenError, adapter};
 
@@ -140,7 +140,9 @@ impl Backend for WgpuBackend {
         let maker = plan.proxy.as_ref().map_or(Maker::Rays, |proxy| Maker::Polygons(proxy.target()));
         let pipeline = match maker {
             Maker::Rays => self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?,
-            Maker::Polygons(target) => self.pipelines.blending_into(&self.device, Variant::of(plan, Entry::Proxy), target)?,
+            Maker::Polygons(target) => {
+                self.pipelines.blending_into(&self.device, Variant::of(plan, Entry::Proxy), target)?
+            }
         };
         let uniforms = self.scene.update(&self.device, plan, pipeline)?;
         self.scene.resize(&self.device, size, maker)?;

@@ -13,11 +13,10 @@ use crate::OpenError;
 pub(crate) const SUB_TEXEL_BITS: u32 = 8;
 
 /// What is used where an adapter has it.
-const WANTED: Features =
-    Features::TIMESTAMP_QUERY
-        .union(Features::FLOAT32_FILTERABLE)
-        .union(Features::FLOAT32_BLENDABLE)
-        .union(Features::TEXTURE_FORMAT_16BIT_NORM);
+const WANTED: Features = Features::TIMESTAMP_QUERY
+    .union(Features::FLOAT32_FILTERABLE)
+    .union(Features::FLOAT32_BLENDABLE)
+    .union(Features::TEXTURE_FORMAT_16BIT_NORM);
 
 /// A device, its queue, and what went wrong on it.
 pub(crate) struct Device {

@@ -76,7 +76,8 @@ impl Picture {
     /// Brings the picture back, through `staging`.
     pub(crate) fn read(&self, device: &Device, staging: &mut Reused) -> Result<Image<f32>, RenderError> {
         let target = self.maker.target();
-        let row_bytes = (self.size.x * target.pixel_bytes() as u32).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let row_bytes =
+            (self.size.x * target.pixel_bytes() as u32).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let n_bytes = u64::from(row_bytes) * u64::from(self.size.y);
         let buffer = staging.reserve(device, n_bytes)?;
         device.checked("copying the picture", n_bytes, || {

@@ -63,12 +63,7 @@ impl Pipeline {
     }
 }
 
-fn build(
-    device: &Device,
-    library: &ShaderLibrary,
-    variant: &Variant,
-    target: Target,
-) -> Result<Pipeline, RenderError> {
+fn build(device: &Device, library: &ShaderLibrary, variant: &Variant, target: Target) -> Result<Pipeline, RenderError> {
     let shader = library.specialise(variant).map_err(|e| RenderError::Shader { message: e.to_string() })?;
     let n_bytes = shader.wgsl.len() as u64;
     device.checked("building a shader variant", n_bytes, || from_shader(&device.device, shader, target))

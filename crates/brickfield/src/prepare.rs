@@ -6,7 +6,8 @@ use brickfield_bricks::BrickTree;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BrickId, Level, ValueRange};
 use brickfield_frame::{
-    Beams, Division, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, Placement, RayFrame, Sampling, SamplingError, Steps,
+    Beams, Division, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, Placement, ProxyGeometry, RayFrame,
+    Sampling, SamplingError, Steps,
 };
 use brickfield_lod::{Culling, Selection, View, back_to_front, select_cut};
 use brickfield_optics::QuadratureRule;
@@ -111,7 +112,7 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
         features: FeatureSet::default(),
     };
     if let Technique::Polygons(target) = scene.technique {
-        plan.proxy = Some(residency.proxy(&plan, &ordered, target));
+        plan.proxy = Some(Arc::new(ProxyGeometry::of(&plan, &ordered, target)));
     }
     plan.beams = overview.and_then(|overview| Beams::of(&plan, &overview)).map(Arc::new);
     plan.features = features(&plan, levels_differ);

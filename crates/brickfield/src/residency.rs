@@ -3,11 +3,8 @@
 use std::sync::Arc;
 
 use brickfield_bricks::{BrickSamples, BrickTree, with_brick_samples};
-use brickfield_core::glam::UVec3;
-use brickfield_core::{Aabb, BrickId, Scalar, ScalarType, TransferFunction};
-use brickfield_frame::{
-    BrickSet, Decode, FramePlan, IndexGrid, MacrocellRanges, Occupancy, Overview, ProxyGeometry, RayFrame, Sampling, Target,
-};
+use brickfield_core::{BrickId, Scalar, ScalarType, TransferFunction};
+use brickfield_frame::{BrickSet, Decode, IndexGrid, MacrocellRanges, Occupancy, Overview};
 use rayon::prelude::*;
 
 /// The brick set of the last frame. A frame that needs the same bricks gets the same set, and backends upload nothing.
@@ -19,17 +16,6 @@ pub struct Residency {
     ranges: Option<MacrocellRanges>,
     occupancy: Option<(TransferFunction, Option<Arc<Occupancy>>)>,
     overview: Option<LastOverview>,
-    proxy: Option<LastProxy>,
-}
-
-/// The polygons of the last frame, and what they are of.
-#[derive(Clone, Debug)]
-struct LastProxy {
-    rays: RayFrame,
-    sampling: Sampling,
-    domain: Aabb,
-    index: IndexGrid,
-    proxy: Arc<ProxyGeometry>,
 }
 
 /// The overview of the last frame, and what it is of.
@@ -53,7 +39,7 @@ impl Residency {
             _ => {
                 let set = Arc::new(gather(tree, &bricks));
                 *self =
-                    Residency { bricks, set: Some(Arc::clone(&set)), ranges: None, occupancy: None, overview: None, proxy: None };
+                    Residency { bricks, set: Some(Arc::clone(&set)), ranges: None, occupancy: None, overview: None };
                 set
             }
         }
@@ -89,24 +75,6 @@ impl Residency {
                 overview
             }
         }
-    }
-
-    /// The polygons of a plan whose bricks are these, from back to front.
-    pub(crate) fn proxy(&mut self, plan: &FramePlan, back_to_front: &[UVec3], target: Target) -> Arc<ProxyGeometry> {
-        let is_of = |last: &LastProxy| {
-            last.rays == plan.rays
-                && last.sampling == plan.sampling
-                && last.domain == plan.domain
-                && last.proxy.target() == target
-                && last.index == plan.index
-        };
-        if let Some(last) = self.proxy.as_ref().filter(|last| is_of(last)) {
-            return Arc::clone(&last.proxy);
-        }
-        let proxy = Arc::new(ProxyGeometry::of(plan, back_to_front, target));
-        let (rays, sampling, domain, index) = (plan.rays, plan.sampling, plan.domain, plan.index.clone());
-        self.proxy = Some(LastProxy { rays, sampling, domain, index, proxy: Arc::clone(&proxy) });
-        proxy
     }
 }
 

@@ -3,14 +3,38 @@
 use std::process::ExitCode;
 
 use brickfield_conformance::compare::{CompareArgs, compare, parse, say, short_of};
+use brickfield_conformance::lamar::{LamarArgs, lamar};
 use brickfield_conformance::report::{Report, absences, table};
+use clap::Parser;
 
 fn main() -> ExitCode {
+    let is_paper =
+        |word: std::ffi::OsString| word.to_str().is_some_and(|w| w == "--paper" || w.starts_with("--paper="));
+    if std::env::args_os().skip(1).any(is_paper) {
+        return of_paper();
+    }
     let args = parse(std::env::args_os().collect()).unwrap_or_else(|e| e.exit());
     match compare(&args) {
         Ok(report) => finish(&args, &report),
         Err(e) => {
             eprintln!("compare: {}", e.to_string().split_whitespace().collect::<Vec<_>>().join(" "));
+            ExitCode::from(e.status())
+        }
+    }
+}
+
+/// A paper's own comparisons, with options of their own.
+fn of_paper() -> ExitCode {
+    let args = LamarArgs::parse();
+    match lamar(&args) {
+        Ok(findings) => {
+            for missed in &findings.missed {
+                eprintln!("compare: missed: {missed}");
+            }
+            ExitCode::from(if args.check && !findings.missed.is_empty() { 4 } else { 0 })
+        }
+        Err(e) => {
+            eprintln!("compare: {e}");
             ExitCode::from(e.status())
         }
     }

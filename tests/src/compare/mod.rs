@@ -3,7 +3,7 @@
 mod contest;
 mod options;
 mod output;
-mod rivals;
+pub(crate) mod rivals;
 mod subject;
 mod sweep;
 

@@ -7,14 +7,14 @@ use super::CompareError;
 use crate::report::BackendInfo;
 
 /// The backends that could be opened, and what is to be said of all that were asked for.
-pub(super) struct Rivals {
-    pub(super) present: Vec<Box<dyn Backend>>,
-    pub(super) infos: Vec<BackendInfo>,
+pub(crate) struct Rivals {
+    pub(crate) present: Vec<Box<dyn Backend>>,
+    pub(crate) infos: Vec<BackendInfo>,
 }
 
 impl Rivals {
     /// Opens each kind once; one that cannot be opened is absent, which is no error.
-    pub(super) fn open(kinds: &[BackendKind], adapter: Option<&str>) -> Rivals {
+    pub(crate) fn open(kinds: &[BackendKind], adapter: Option<&str>) -> Rivals {
         let mut rivals = Rivals { present: Vec::new(), infos: Vec::new() };
         let mut kinds = kinds.to_vec();
         kinds.sort();
@@ -36,7 +36,7 @@ impl Rivals {
 
     /// # Errors
     /// If no backend is there at all: why each is absent.
-    pub(super) fn check_any(&self) -> Result<(), CompareError> {
+    pub(crate) fn check_any(&self) -> Result<(), CompareError> {
         if !self.present.is_empty() {
             return Ok(());
         }
@@ -46,7 +46,7 @@ impl Rivals {
 
     /// # Errors
     /// The first kind of `required` that is absent or was not asked for.
-    pub(super) fn check_required(&self, required: &[BackendKind]) -> Result<(), CompareError> {
+    pub(crate) fn check_required(&self, required: &[BackendKind]) -> Result<(), CompareError> {
         for kind in required {
             let info = self.infos.iter().find(|i| i.backend == kind.name());
             let reason = match info {

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use brickfield::frame::{
-    Beams, BrickSet, Decode, Feature, FramePlan, IndexEntry, Mode, Overview, ProxyCorner, ProxyGeometry, SampleFormat, Sampling,
+    Beams, BrickSet, Decode, Feature, FramePlan, IndexEntry, Mode, Overview, ProxyCorner, ProxyGeometry, SampleFormat,
+    Sampling,
 };
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, Knot, Level, TransferFunction};

@@ -84,9 +84,8 @@ impl Tolerance {
     pub fn of(plan: &FramePlan, reference: &Discrete, device: &Capabilities) -> Result<Tolerance, Complaint> {
         let most = most_difference(plan)?;
         let blended = blending(plan, reference);
-        let exact = |bound: f64| {
-            reference.ambiguity.iter().zip(&blended).map(|(a, b)| bound + a + b).collect::<Vec<f64>>()
-        };
+        let exact =
+            |bound: f64| reference.ambiguity.iter().zip(&blended).map(|(a, b)| bound + a + b).collect::<Vec<f64>>();
         let Mode::Fast { transmittance_floor } = plan.sampling.mode() else {
             return Ok(Tolerance { most: exact(most), bulk: exact(BULK_BOUND) });
         };

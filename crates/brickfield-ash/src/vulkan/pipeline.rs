@@ -184,8 +184,7 @@ impl Pipeline {
         let stage = stage(vk::ShaderStageFlags::COMPUTE, module, &names[0]);
         let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout);
         // SAFETY: module and layout are alive; the layout was made from the module's own bindings.
-        let made =
-            unsafe { self.device.raw().create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
+        let made = unsafe { self.device.raw().create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
         Ok(made.map_err(|(_, code)| code).of("vkCreateComputePipelines")?[0])
     }
 
@@ -201,15 +200,15 @@ impl Pipeline {
         let vertices = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(&buffers)
             .vertex_attribute_descriptions(&attributes);
-        let triangles = vk::PipelineInputAssemblyStateCreateInfo::default()
-            .topology(vk::PrimitiveTopology::TRIANGLE_LIST);
+        let triangles =
+            vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
         let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
         let raster = vk::PipelineRasterizationStateCreateInfo::default()
             .polygon_mode(vk::PolygonMode::FILL)
             .cull_mode(vk::CullModeFlags::NONE)
             .line_width(1.0);
-        let samples = vk::PipelineMultisampleStateCreateInfo::default()
-            .rasterization_samples(vk::SampleCountFlags::TYPE_1);
+        let samples =
+            vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
         let blended = [over()];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blended);
         let changing = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
@@ -228,8 +227,7 @@ impl Pipeline {
             .render_pass(pass.raw);
         // SAFETY: all that the description names is alive; stages and layout are of one module. The pass may go: those that
         // the pipeline is used in are compatible.
-        let made =
-            unsafe { self.device.raw().create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
+        let made = unsafe { self.device.raw().create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
         Ok(made.map_err(|(_, code)| code).of("vkCreateGraphicsPipelines")?[0])
     }
 }
@@ -257,10 +255,7 @@ fn corner_attributes() -> [vk::VertexInputAttributeDescription; 4] {
     ];
     std::array::from_fn(|location| {
         let (offset, format) = members[location];
-        vk::VertexInputAttributeDescription::default()
-            .location(location as u32)
-            .format(format)
-            .offset(offset as u32)
+        vk::VertexInputAttributeDescription::default().location(location as u32).format(format).offset(offset as u32)
     })
 }
 

@@ -184,10 +184,9 @@ impl Use {
                 Stage::VERTEX_INPUT | Stage::VERTEX_SHADER | Stage::FRAGMENT_SHADER,
                 Access::VERTEX_ATTRIBUTE_READ | Access::INDEX_READ | Access::UNIFORM_READ | Access::SHADER_READ,
             ),
-            Use::Canvas => (
-                Stage::COLOR_ATTACHMENT_OUTPUT,
-                Access::COLOR_ATTACHMENT_READ | Access::COLOR_ATTACHMENT_WRITE,
-            ),
+            Use::Canvas => {
+                (Stage::COLOR_ATTACHMENT_OUTPUT, Access::COLOR_ATTACHMENT_READ | Access::COLOR_ATTACHMENT_WRITE)
+            }
             Use::ShaderWrite => (Stage::COMPUTE_SHADER, Access::SHADER_READ | Access::SHADER_WRITE),
             Use::HostRead => (Stage::HOST, Access::HOST_READ),
         }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickSide, Camera, Grid, Knot, Level, Projection, TransferFunction};
 use brickfield_frame::{
-    BrickSet, Decode, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, QuadratureRule, RayFrame, Steps,
-    SampleFormat, Sampling,
+    BrickSet, Decode, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, QuadratureRule, RayFrame,
+    SampleFormat, Sampling, Steps,
 };
 
 const N: u32 = 16;
@@ -74,7 +74,7 @@ pub(crate) fn plan(bricks: BrickSet, transfer: TransferFunction, rule: Quadratur
         bricks: Arc::new(bricks),
         occupancy: None,
         beams: None,
-            proxy: None,
+        proxy: None,
         features,
     }
 }

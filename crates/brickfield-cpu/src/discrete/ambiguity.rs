@@ -122,9 +122,9 @@ impl Ambiguity {
         };
         match plan.sampling.division() {
             Division::Ray => of(span, relative(&plan.domain, plan.rays.center), Level(0), None),
-            Division::Brick => {
-                Blocks::new(plan, ray, span).map(|c| of(c.span, block_box(plan, &c), c.entry.level(), Some(c.cell))).sum()
-            }
+            Division::Brick => Blocks::new(plan, ray, span)
+                .map(|c| of(c.span, block_box(plan, &c), c.entry.level(), Some(c.cell)))
+                .sum(),
         }
     }
 

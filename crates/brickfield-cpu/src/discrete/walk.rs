@@ -104,7 +104,13 @@ mod tests {
     #[test]
     fn a_parallel_ray_in_a_lower_face_is_inside_in_an_upper_face_outside() {
         let b = Aabb { min: DVec3::splat(-1.0), max: DVec3::ONE };
-        let ray = |y| PlanRay { anchor: DVec3::new(0.0, y, 0.0), direction: DVec3::X, t_anchor: 5.0, t_eye: 0.0, stretch: 1.0 };
+        let ray = |y| PlanRay {
+            anchor: DVec3::new(0.0, y, 0.0),
+            direction: DVec3::X,
+            t_anchor: 5.0,
+            t_eye: 0.0,
+            stretch: 1.0,
+        };
         assert_eq!(clip(&ray(-1.0), &b, 0.0), Some(Span { start: 4.0, end: 6.0 }));
         assert_eq!(clip(&ray(-1.0), &b, 5.5), Some(Span { start: 5.5, end: 6.0 }));
         assert_eq!(clip(&ray(1.0), &b, 0.0), None);

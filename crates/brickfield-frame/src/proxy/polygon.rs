@@ -93,8 +93,7 @@ pub(super) fn grown(polygon: &[DVec2], by: f64) -> Vec<DVec2> {
 }
 
 /// The corners of a square, counter-clockwise.
-const SQUARE: [DVec2; 4] =
-    [DVec2::new(1.0, -1.0), DVec2::new(1.0, 1.0), DVec2::new(-1.0, 1.0), DVec2::new(-1.0, -1.0)];
+const SQUARE: [DVec2; 4] = [DVec2::new(1.0, -1.0), DVec2::new(1.0, 1.0), DVec2::new(-1.0, 1.0), DVec2::new(-1.0, -1.0)];
 
 /// The corner of the square that lies farthest to the right of an edge of this direction.
 fn quadrant(edge: DVec2) -> usize {
@@ -124,7 +123,8 @@ fn strictly_convex(polygon: &[DVec2]) -> Vec<DVec2> {
 fn half(points: impl Iterator<Item = DVec2>) -> Vec<DVec2> {
     let mut side: Vec<DVec2> = Vec::new();
     for p in points {
-        while side.len() >= 2 && (side[side.len() - 1] - side[side.len() - 2]).perp_dot(p - side[side.len() - 1]) <= 0.0 {
+        while side.len() >= 2 && (side[side.len() - 1] - side[side.len() - 2]).perp_dot(p - side[side.len() - 1]) <= 0.0
+        {
             side.pop();
         }
         side.push(p);

@@ -29,7 +29,10 @@ enum Part {
     /// A triangle of the picture.
     Facet([DVec2; 3]),
     /// The pyramid around an axis, from the eye.
-    Pyramid { axis: usize, eye: DVec3 },
+    Pyramid {
+        axis: usize,
+        eye: DVec3,
+    },
 }
 
 /// Pyramids are wider than need be by this share: shaders decide, to which one belongs a ray.
@@ -115,8 +118,7 @@ fn facets_over(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Sta
     let (low, high) = (square(low), square(high));
     let squares = (low.y..=high.y).flat_map(|y| (low.x..=high.x).map(move |x| (x, y)));
     let facets = squares.flat_map(|(x, y)| [0, 1].map(|half| 2 * (x + y * rays.facet_squares().x) + half));
-    let stack =
-        |f| picture_plane(plan, projector, rays.facet_normal(f), f, Part::Facet(rays.facet_corners(f)));
+    let stack = |f| picture_plane(plan, projector, rays.facet_normal(f), f, Part::Facet(rays.facet_corners(f)));
     facets.map(stack).collect()
 }
 
@@ -208,7 +210,7 @@ fn in_pyramid(plan: &FramePlan, polygon: Vec<DVec3>, axis: usize, eye: DVec3) ->
 /// The part of a polygon of the picture that lies in a triangle.
 fn in_triangle(polygon: Vec<DVec2>, [a, b, c]: [DVec2; 3]) -> Vec<DVec2> {
     let side = (b - a).perp_dot(c - a).signum();
-    [(a, b), (b, c), (c, a)].into_iter().fold(polygon, |polygon, (from, to)| {
-        clip(&polygon, |p| side * (to - from).perp_dot(p - from))
-    })
+    [(a, b), (b, c), (c, a)]
+        .into_iter()
+        .fold(polygon, |polygon, (from, to)| clip(&polygon, |p| side * (to - from).perp_dot(p - from)))
 }

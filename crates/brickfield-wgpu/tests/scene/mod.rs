@@ -10,8 +10,8 @@ use brickfield_core::{
     Aabb, BrickLayout, BrickSide, Camera, Grid, Knot, Level, Projection, TransferFunction, ValueRange,
 };
 use brickfield_frame::{
-    BrickSet, Decode, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, QuadratureRule, RayFrame, Steps,
-    SampleFormat, Sampling,
+    BrickSet, Decode, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, QuadratureRule, RayFrame,
+    SampleFormat, Sampling, Steps,
 };
 
 const SIDE: BrickSide = BrickSide::S16;

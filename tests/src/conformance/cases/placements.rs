@@ -49,8 +49,7 @@ fn of_rays() -> Vec<Case> {
     let skewed = |(placement, _): (Placement, _)| {
         let name = format!("placement/{}-skew", placement.name());
         picture(name, catches![shader::LAST_NOT_CUT, AnchorHalfVoxel], move || {
-            placed(hills(&skew_grid(), ScalarType::U16), soft(ScalarType::U16), placement)
-                .rule(QuadratureRule::Gauss2)
+            placed(hills(&skew_grid(), ScalarType::U16), soft(ScalarType::U16), placement).rule(QuadratureRule::Gauss2)
         })
     };
     PLACEMENTS.into_iter().map(case).chain(PLACEMENTS.into_iter().map(skewed)).collect()
@@ -73,11 +72,12 @@ fn of_bricks() -> Vec<Case> {
                 .with(|s| s.division = Division::Brick)
         })
     };
-    let skip = picture("bricks/skip-macrocells", catches![shader::LEAPS_TOO_FAR_IN_BRICK, shader::MACROCELL_ROW], || {
-        Setup::new(sparse(&grid(), ScalarType::U8), soft(ScalarType::U8))
-            .step(0.4)
-            .with(|s| s.division = Division::Brick)
-    });
+    let skip =
+        picture("bricks/skip-macrocells", catches![shader::LEAPS_TOO_FAR_IN_BRICK, shader::MACROCELL_ROW], || {
+            Setup::new(sparse(&grid(), ScalarType::U8), soft(ScalarType::U8))
+                .step(0.4)
+                .with(|s| s.division = Division::Brick)
+        });
     let own = PLACEMENTS.into_iter().map(case);
     own.chain(QuadratureRule::ALL.map(rule)).chain([skip]).collect()
 }

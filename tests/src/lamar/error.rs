@@ -1,0 +1,48 @@
+//! Why a part could not be run.
+
+use std::io;
+use std::path::PathBuf;
+
+use crate::compare::CompareError;
+
+/// Why a part could not be run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum LamarError {
+    #[error("no data: set BRICKFIELD_DATA (or --data) to the folder of real volumes")]
+    NoData,
+    #[error(transparent)]
+    Volume(#[from] brickfield::io::OpenError),
+    #[error("--out {}: {source}", path.display())]
+    Out { path: PathBuf, source: io::Error },
+    #[error(transparent)]
+    Backends(#[from] CompareError),
+    #[error(transparent)]
+    Tree(#[from] brickfield::bricks::BuildError),
+    #[error(transparent)]
+    Camera(#[from] brickfield_core::CameraError),
+    #[error(transparent)]
+    Prepare(#[from] brickfield::PrepareError),
+    #[error("{backend}: {source}")]
+    Render { backend: &'static str, source: brickfield::frame::RenderError },
+    #[error(transparent)]
+    Metric(#[from] crate::metrics::MetricError),
+    #[error(transparent)]
+    Rule(#[from] crate::conformance::Complaint),
+    #[error(transparent)]
+    Picture(#[from] brickfield::PictureError),
+    #[error("standard output: {0}")]
+    Print(io::Error),
+}
+
+impl LamarError {
+    /// The exit status that scripts see: 1 failed, 2 unusable arguments or data, 3 a required backend is absent.
+    pub fn status(&self) -> u8 {
+        match self {
+            LamarError::Backends(e) => e.status(),
+            LamarError::NoData | LamarError::Prepare(_) => 2,
+            _ => 1,
+        }
+    }
+}

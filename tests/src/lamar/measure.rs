@@ -1,0 +1,109 @@
+//! Frames: how long, how far from the answer, and whether as the plan says.
+
+use std::time::Instant;
+
+use brickfield::bricks::BrickTree;
+use brickfield::cpu::{ContinuousOptions, Discrete, continuous, discrete};
+use brickfield::frame::Backend;
+use brickfield::{Residency, Scene, Skipping, Technique, prepare};
+use brickfield_core::glam::DVec3;
+use brickfield_core::{Aabb, Image, Volume};
+use serde::Serialize;
+
+use super::LamarError;
+use crate::conformance::Tolerance;
+use crate::metrics::{delta_e, errors, median};
+
+/// Milliseconds over frames.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[allow(missing_docs)]
+pub(super) struct Spread {
+    pub(super) median: f64,
+    pub(super) min: f64,
+    pub(super) max: f64,
+}
+
+/// What a frame draws.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(super) struct Drawn {
+    pub(super) n_bricks: usize,
+    pub(super) n_bytes: usize,
+    pub(super) n_polygons: usize,
+}
+
+/// How far a picture is from the answer at full resolution.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct Distance {
+    pub(super) rmse: f64,
+    pub(super) max: f64,
+    pub(super) delta_e_mean: f64,
+}
+
+/// The continuous integral at full resolution: what everything is held against.
+pub(super) fn answer(volume: &Volume, scene: &Scene) -> Image<f64> {
+    let options = ContinuousOptions { tolerance: 1e-7, transmittance_floor: 1e-9 };
+    let everywhere = Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY };
+    continuous(volume, &scene.transfer, &scene.camera, scene.size, &everywhere, &options).image
+}
+
+/// The sum that the scene's cut asks for in f64, with nothing culled and nothing left out.
+pub(super) fn reference(tree: &BrickTree, scene: &Scene) -> Result<Discrete, LamarError> {
+    let complete = Scene { skipping: Skipping::Off, technique: Technique::RayCasting, ..scene.clone() };
+    Ok(discrete(&prepare(tree, &complete, &mut Residency::default())?))
+}
+
+/// One scene on one backend.
+pub(super) struct Contestant<'a> {
+    tree: &'a BrickTree,
+    scene: &'a Scene,
+    residency: Residency,
+    ms: Vec<f64>,
+}
+
+impl<'a> Contestant<'a> {
+    pub(super) fn new(tree: &'a BrickTree, scene: &'a Scene) -> Contestant<'a> {
+        Contestant { tree, scene, residency: Residency::default(), ms: Vec::new() }
+    }
+
+    /// A frame from the scene to the picture in memory, selection, order and polygons included; bricks are resident from the
+    /// frame before.
+    pub(super) fn frame(&mut self, backend: &mut dyn Backend) -> Result<(Image<f32>, Drawn), LamarError> {
+        let name = backend.describe().backend;
+        let failed = |source| LamarError::Render { backend: name, source };
+        let plan = prepare(self.tree, self.scene, &mut self.residency)?;
+        backend.render(&plan).map_err(failed)?;
+        let begin = Instant::now();
+        let plan = prepare(self.tree, self.scene, &mut self.residency)?;
+        let image = backend.render(&plan).map_err(failed)?.image;
+        self.ms.push(begin.elapsed().as_secs_f64() * 1e3);
+        let drawn = Drawn {
+            n_bricks: plan.bricks.n_bricks() as usize,
+            n_bytes: plan.bricks.bytes().len(),
+            n_polygons: plan.proxy.as_ref().map_or(0, |proxy| proxy.n_polygons()),
+        };
+        Ok((image, drawn))
+    }
+
+    pub(super) fn spread(&self) -> Spread {
+        let (min, max) = self.ms.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
+        Spread { median: median(self.ms.clone()), min, max }
+    }
+
+    /// Whether a picture is within the rule of its plan's f64 reference; why not, if it is not.
+    pub(super) fn judge(
+        &mut self,
+        image: &Image<f32>,
+        reference: &Discrete,
+        backend: &dyn Backend,
+    ) -> Result<Option<String>, LamarError> {
+        let plan = prepare(self.tree, self.scene, &mut self.residency)?;
+        let tolerance = Tolerance::of(&plan, reference, &backend.describe().capabilities)?;
+        Ok(tolerance.judge(image, &reference.image).complaint.map(|c| c.to_string()))
+    }
+}
+
+pub(super) fn distance(image: &Image<f32>, answer: &Image<f64>) -> Result<Distance, LamarError> {
+    let e = errors(image, answer)?;
+    let delta_e_mean = delta_e(image, answer, [0.0; 3])?.mean;
+    Ok(Distance { rmse: e.rmse, max: e.worst.difference, delta_e_mean })
+}

@@ -1,0 +1,69 @@
+//! LaMar, Hamann and Joy 1999 on this project's data: table 1 with its errors, figures 8 and 14, and what else the paper claims.
+//!
+//! - [`table`]: fixed tiles against multiresolution, three proxy geometries and the ray caster, time and error on every backend.
+//! - [`downsampling`]: subsampling against averaging. [`memory`]: the formula for shared voxels against what is stored.
+//! - [`seams`]: a constant field, with and without opacity correction. [`shells`]: tessellated shells against spheres.
+//! - [`figures`]: pictures. [`views`]: a screen-space error of a pixel, over views of a large volume.
+
+mod args;
+mod downsampling;
+mod error;
+mod figures;
+mod measure;
+mod memory;
+mod scenes;
+mod seams;
+mod shells;
+mod table;
+mod views;
+
+pub use args::{LamarArgs, Part};
+pub use error::LamarError;
+
+use crate::compare::rivals::Rivals;
+use crate::compare::say;
+
+/// What came of the parts that were asked for.
+#[derive(Clone, Debug, Default)]
+pub struct Findings {
+    /// What does not hold, in words.
+    pub missed: Vec<String>,
+}
+
+/// Runs the parts that `args` ask for, and prints what they find.
+///
+/// # Errors
+/// Data or a folder that cannot be had, a scene that is refused, a backend that fails.
+pub fn lamar(args: &LamarArgs) -> Result<Findings, LamarError> {
+    std::fs::create_dir_all(&args.out).map_err(|source| LamarError::Out { path: args.out.clone(), source })?;
+    let mut rivals = Rivals::open(&args.backends, args.adapter.as_deref());
+    rivals.check_required(&args.require)?;
+    rivals.check_any()?;
+    let mut findings = Findings::default();
+    for info in &rivals.infos {
+        let state = match (&info.adapter, &info.absent) {
+            (Some(adapter), _) => format!("{adapter}, {}", info.driver.as_deref().unwrap_or_default()),
+            (None, reason) => format!("absent: {}", reason.as_deref().unwrap_or_default()),
+        };
+        print(&format!("{}: {state}", info.backend))?;
+    }
+    for part in args.parts() {
+        print(&format!("\n## {}\n", part.title()))?;
+        let missed = match part {
+            Part::Table => table::run(args, &mut rivals)?,
+            Part::Downsampling => downsampling::run(args)?,
+            Part::Memory => memory::run(args)?,
+            Part::Seams => seams::run(args, &mut rivals)?,
+            Part::Shells => shells::run(args, &mut rivals)?,
+            Part::Figures => figures::run(args, &mut rivals)?,
+            Part::Views => views::run(args, &mut rivals)?,
+        };
+        findings.missed.extend(missed);
+    }
+    Ok(findings)
+}
+
+/// A line on standard output.
+fn print(line: &str) -> Result<(), LamarError> {
+    say(&format!("{line}\n")).map_err(LamarError::Print)
+}

@@ -1,0 +1,111 @@
+//! What is looked at, from where, by which geometry.
+
+use std::path::Path;
+
+use brickfield::bricks::{BrickTree, BuildOptions, Downsampling, build_tree};
+use brickfield::frame::{Backend, Division, Placement, Target};
+use brickfield::io::{Limits, WorldFrame, open};
+use brickfield::lod::Criterion;
+use brickfield::optics::automatic;
+use brickfield::{Scene, Technique, Viewpoint};
+use brickfield_core::glam::{DVec3, UVec2};
+use brickfield_core::{BrickSide, Camera, Grid, IndexPos, Projection, Ray, TransferFunction, Volume, WorldPos};
+
+use super::{LamarArgs, LamarError};
+
+/// The data sets, as paths below the folder of real volumes.
+const DATA: [&str; 3] = ["ct/engine.vti", "ct/aneurism.vti", "ct/LIDC2.mha"];
+
+/// A volume with its transfer function.
+pub(super) struct Exhibit {
+    pub(super) name: String,
+    pub(super) volume: Volume,
+    pub(super) transfer: TransferFunction,
+    pub(super) frame: WorldFrame,
+}
+
+/// How samples are placed, and by whom.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Geometry {
+    pub(super) name: &'static str,
+    pub(super) placement: Placement,
+    pub(super) technique: Technique,
+}
+
+/// The data sets that are asked for, one by one.
+pub(super) fn exhibits(args: &LamarArgs) -> Result<impl Iterator<Item = Result<Exhibit, LamarError>>, LamarError> {
+    let folder = args.data.clone().ok_or(LamarError::NoData)?;
+    let wanted = |path: &&str| args.only.as_ref().is_none_or(|text| path.contains(text.as_str()));
+    let paths: Vec<&str> = DATA.into_iter().filter(wanted).collect();
+    Ok(paths.into_iter().map(move |path| exhibit(&folder, path)))
+}
+
+fn exhibit(folder: &Path, name: &str) -> Result<Exhibit, LamarError> {
+    let opened = open(&folder.join(name), &Limits::default())?;
+    let transfer = automatic(&opened.volume);
+    Ok(Exhibit { name: name.to_owned(), transfer, frame: opened.frame, volume: opened.volume })
+}
+
+/// The brick sides that are asked for.
+pub(super) fn sides(args: &LamarArgs) -> Vec<BrickSide> {
+    let wanted = |side: &BrickSide| args.sides.is_empty() || args.sides.contains(side);
+    BrickSide::ALL.into_iter().filter(wanted).collect()
+}
+
+pub(super) fn tree(volume: &Volume, side: BrickSide, downsampling: Downsampling) -> Result<BrickTree, LamarError> {
+    Ok(build_tree(volume, &BuildOptions { side, downsampling, max_bytes: None })?)
+}
+
+/// Three views along one line: from outside, from the box's surface, and from half-way to its centre.
+pub(super) fn views(exhibit: &Exhibit, size: UVec2) -> Result<[(&'static str, Camera); 3], LamarError> {
+    let grid = exhibit.volume.grid();
+    let outside = Viewpoint::default().camera(grid, exhibit.frame, size)?;
+    let center = grid.world_box().center();
+    let way = surface_from(grid, center, -outside.forward());
+    let wide = Projection::Perspective { fov_y: 70f64.to_radians() };
+    let at = |share: f64| Camera::look_at(center + way * share, center - way, outside.up(), wide);
+    Ok([("outside", outside), ("surface", at(1.0)?), ("inside", at(0.5)?)])
+}
+
+/// From a point of the volume to its surface.
+fn surface_from(grid: &Grid, from: DVec3, direction: DVec3) -> DVec3 {
+    let origin = grid.index(WorldPos(from));
+    let ray = Ray { origin: origin.0, direction: grid.world_to_index().transform_vector3(direction) };
+    let end = ray.clip(&grid.index_box()).map_or(0.0, |span| span.end);
+    grid.world(IndexPos(ray.at(end))).0 - from
+}
+
+/// The three proxy geometries, rasterised; and the ray caster, whose shells are spheres.
+pub(super) fn geometries(args: &LamarArgs) -> [Geometry; 4] {
+    let polygons = |name, placement| Geometry { name, placement, technique: Technique::Polygons(Target::Float32) };
+    [
+        polygons("object planes", Placement::ObjectPlanes),
+        polygons("viewport planes", Placement::ViewportPlanes),
+        polygons("shells", Placement::TessellatedShells { facet_pixels: args.facet_pixels }),
+        Geometry { name: "ray caster", placement: Placement::Shells, technique: Technique::RayCasting },
+    ]
+}
+
+/// Those that a backend draws: without a rasteriser, only rays.
+pub(super) fn geometries_of(args: &LamarArgs, backend: &dyn Backend) -> impl Iterator<Item = Geometry> + use<> {
+    let casts_only = backend.describe().backend == "cpu";
+    geometries(args).into_iter().filter(move |g| !casts_only || g.technique == Technique::RayCasting)
+}
+
+/// A scene of an exhibit.
+pub(super) fn scene(
+    args: &LamarArgs,
+    transfer: &TransferFunction,
+    camera: Camera,
+    geometry: Geometry,
+    detail: &[Criterion],
+) -> Scene {
+    Scene {
+        step_voxels: args.step,
+        placement: geometry.placement,
+        technique: geometry.technique,
+        division: Division::Brick,
+        detail: detail.to_vec(),
+        ..Scene::new(camera, args.size, transfer.clone())
+    }
+}

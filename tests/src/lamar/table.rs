@@ -1,0 +1,166 @@
+//! Table 1: fixed tiles against multiresolution.
+
+use brickfield::Scene;
+use brickfield::bricks::{BrickTree, Downsampling};
+use brickfield::cpu::Discrete;
+use brickfield::frame::Backend;
+use brickfield::lod::Criterion;
+use brickfield_core::{Camera, Image};
+use serde::Serialize;
+
+use super::measure::{Contestant, Distance, Drawn, Spread, answer, distance, reference};
+use super::scenes::{Exhibit, Geometry, exhibits, geometries, geometries_of, scene, sides, tree, views};
+use super::{LamarArgs, LamarError, print};
+use crate::compare::rivals::Rivals;
+
+/// A line of the table: one data set, view, tile size, geometry and backend.
+#[derive(Clone, Debug, Serialize)]
+struct Row {
+    data: String,
+    dims: [u32; 3],
+    view: &'static str,
+    side: u32,
+    geometry: &'static str,
+    backend: &'static str,
+    fixed: Cell,
+    multiresolution: Cell,
+}
+
+/// One way of drawing.
+#[derive(Clone, Debug, Serialize)]
+struct Cell {
+    drawn: Drawn,
+    ms: Spread,
+    error: Distance,
+    /// Why the picture is not within the rule of its own cut's f64 reference.
+    complaint: Option<String>,
+}
+
+/// One tree seen from one place.
+struct Seat<'a> {
+    exhibit: &'a Exhibit,
+    tree: &'a BrickTree,
+    camera: Camera,
+    view: &'static str,
+    side: u32,
+    answer: &'a Image<f64>,
+}
+
+pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, LamarError> {
+    print(&format!(
+        "{} x {} pixels, steps of {} voxel(s) of level 0, 2^level of them in coarser bricks; times are medians of {} frames from the\n\
+         scene to the picture (selection, order and polygons included, bricks resident); errors are against the continuous integral\n\
+         at full resolution; \"ok\": within the rule of the f64 sum of the same cut, nothing culled.\n",
+        args.size.x, args.size.y, args.step, args.frames
+    ))?;
+    print(HEADER)?;
+    let mut rows = Vec::new();
+    for exhibit in exhibits(args)? {
+        let exhibit = exhibit?;
+        let views = views(&exhibit, args.size)?;
+        let full = geometries(args)[3];
+        let answers =
+            views.map(|(_, camera)| answer(&exhibit.volume, &scene(args, &exhibit.transfer, camera, full, &[])));
+        for side in sides(args) {
+            let tree = tree(&exhibit.volume, side, Downsampling::Average)?;
+            for ((view, camera), answer) in views.into_iter().zip(&answers) {
+                let seat = Seat { exhibit: &exhibit, tree: &tree, camera, view, side: side.n_samples(), answer };
+                rows.extend(of_seat(args, rivals, &seat)?);
+            }
+        }
+    }
+    let path = args.out.join("table.json");
+    let json = serde_json::to_string_pretty(&rows).expect("rows are plain data");
+    std::fs::write(&path, json).map_err(|source| LamarError::Out { path, source })?;
+    Ok(missed(&rows))
+}
+
+const HEADER: &str = "\
+data               view     side  tiles: fixed multi  geometry        backend  fixed ms (min to max)      multi ms (min to max)      ratio  \
+RMSE: fixed    multi  max: fixed    multi  as the cut says";
+
+fn of_seat(args: &LamarArgs, rivals: &mut Rivals, seat: &Seat<'_>) -> Result<Vec<Row>, LamarError> {
+    let mut rows = Vec::new();
+    for geometry in geometries(args) {
+        let with = |detail: &[Criterion]| scene(args, &seat.exhibit.transfer, seat.camera, geometry, detail);
+        let scenes = [with(&[Criterion::FullResolution]), with(&args.detail)];
+        let references = [reference(seat.tree, &scenes[0])?, reference(seat.tree, &scenes[1])?];
+        for backend in &mut rivals.present {
+            if !geometries_of(args, backend.as_ref()).any(|own| own == geometry) {
+                continue;
+            }
+            let row = contest(args, backend.as_mut(), seat, geometry, (&scenes, &references))?;
+            print(&line(&row))?;
+            rows.push(row);
+        }
+    }
+    Ok(rows)
+}
+
+/// Fixed and multiresolution take turns.
+fn contest(
+    args: &LamarArgs,
+    backend: &mut dyn Backend,
+    seat: &Seat<'_>,
+    geometry: Geometry,
+    (scenes, references): (&[Scene; 2], &[Discrete; 2]),
+) -> Result<Row, LamarError> {
+    let mut contestants = [0, 1].map(|i| Contestant::new(seat.tree, &scenes[i]));
+    let mut last = [None, None];
+    for _ in 0..args.frames {
+        for (contestant, last) in contestants.iter_mut().zip(&mut last) {
+            *last = Some(contestant.frame(backend)?);
+        }
+    }
+    let cell = |i: usize, contestant: &mut Contestant<'_>| -> Result<Cell, LamarError> {
+        let (image, drawn) = last[i].as_ref().expect("at least one frame");
+        let complaint = contestant.judge(image, &references[i], backend)?;
+        Ok(Cell { drawn: *drawn, ms: contestant.spread(), error: distance(image, seat.answer)?, complaint })
+    };
+    let [fixed, multi] = &mut contestants;
+    let (fixed, multiresolution) = (cell(0, fixed)?, cell(1, multi)?);
+    Ok(Row {
+        data: seat.exhibit.name.clone(),
+        dims: seat.exhibit.volume.grid().dims().to_array(),
+        view: seat.view,
+        side: seat.side,
+        geometry: geometry.name,
+        backend: backend.describe().backend,
+        fixed,
+        multiresolution,
+    })
+}
+
+fn line(row: &Row) -> String {
+    let ms = |s: &Spread| format!("{:>7.1} ({:.1} to {:.1})", s.median, s.min, s.max);
+    let verdict = |c: &Cell| c.complaint.as_deref().unwrap_or("ok").to_owned();
+    format!(
+        "{:<18} {:<8} {:>4} {:>12} {:>5}  {:<15} {:<7} {:<26} {:<26} {:>5.2}  {:>10.2e} {:>8.2e} {:>11.2e} {:>8.2e}  {}, {}",
+        row.data,
+        row.view,
+        row.side,
+        row.fixed.drawn.n_bricks,
+        row.multiresolution.drawn.n_bricks,
+        row.geometry,
+        row.backend,
+        ms(&row.fixed.ms),
+        ms(&row.multiresolution.ms),
+        row.fixed.ms.median / row.multiresolution.ms.median,
+        row.fixed.error.rmse,
+        row.multiresolution.error.rmse,
+        row.fixed.error.max,
+        row.multiresolution.error.max,
+        verdict(&row.fixed),
+        verdict(&row.multiresolution),
+    )
+}
+
+/// What the paper claims and a row does not show.
+fn missed(rows: &[Row]) -> Vec<String> {
+    let name = |r: &Row| format!("{}, {}, {}^3, {}, {}", r.data, r.view, r.side, r.geometry, r.backend);
+    let slower = |r: &&Row| r.view != "outside" && r.multiresolution.ms.median >= r.fixed.ms.median;
+    let wrong = |r: &Row| r.fixed.complaint.clone().or_else(|| r.multiresolution.complaint.clone());
+    let slower = rows.iter().filter(slower).map(|r| format!("{}: multiresolution is not faster", name(r)));
+    let wrong = rows.iter().filter_map(|r| wrong(r).map(|why| format!("{}: {why}", name(r))));
+    slower.chain(wrong).collect()
+}

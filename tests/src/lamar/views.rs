@@ -1,0 +1,129 @@
+//! A screen-space error of one pixel: what it draws, how long it takes and what it costs, view by view.
+
+use brickfield::bricks::{BrickTree, Downsampling};
+use brickfield::frame::Backend;
+use brickfield::lod::Criterion;
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{BrickSide, Camera, Grid, Projection, ScalarType};
+use serde::Serialize;
+
+use super::measure::{Contestant, Distance, Drawn, Spread, distance};
+use super::scenes::{Geometry, geometries, scene, tree};
+use super::{LamarArgs, LamarError, print};
+use crate::compare::rivals::Rivals;
+use crate::volumes::{Phantom, phantom_of};
+
+#[derive(Clone, Debug, Serialize)]
+struct Row {
+    view: u32,
+    backend: &'static str,
+    full: (Drawn, Spread),
+    pixel: (Drawn, Spread),
+    error: Distance,
+}
+
+pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, LamarError> {
+    let Phantom { volume, transfer, .. } = phantom_of(UVec3::splat(args.volume_side), ScalarType::U8);
+    let tree = tree(&volume, BrickSide::S32, Downsampling::Average)?;
+    print(&format!(
+        "The phantom at {}^3, {} views, {} x {} pixels, ray caster, steps of {} voxel(s) times 2^level, bricks of 32. Errors are against\n\
+         the same backend's picture at full resolution.\n",
+        args.volume_side, args.views, args.size.x, args.size.y, args.step
+    ))?;
+    print(
+        "view  backend  bricks: full   1 px     MB: full   1 px    ms: full    1 px  ratio   max        RMSE       colour difference: mean",
+    )?;
+    let rays = geometries(args)[3];
+    let mut rows = Vec::new();
+    for view in 0..args.views {
+        let camera = camera(volume.grid(), view, args.views)?;
+        for backend in &mut rivals.present {
+            let row = of_view(args, backend.as_mut(), &tree, (view, camera), (&transfer, rays))?;
+            print(&line(&row))?;
+            rows.push(row);
+        }
+    }
+    summary(&rows)?;
+    let path = args.out.join("views.json");
+    let json = serde_json::to_string_pretty(&rows).expect("rows are plain data");
+    std::fs::write(&path, json).map_err(|source| LamarError::Out { path, source })?;
+    Ok(Vec::new())
+}
+
+/// On a spiral around the volume, every fourth view from inside.
+fn camera(grid: &Grid, view: u32, n: u32) -> Result<Camera, LamarError> {
+    let b = grid.world_box();
+    let height = 1.0 - 2.0 * (f64::from(view) + 0.5) / f64::from(n);
+    let angle = f64::from(view) * std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let across = (1.0 - height * height).sqrt();
+    let direction = DVec3::new(across * angle.cos(), across * angle.sin(), height);
+    let distance = [1.6, 1.0, 0.6, 0.25][view as usize % 4] * b.diagonal();
+    let projection = Projection::Perspective { fov_y: 45f64.to_radians() };
+    let up = if direction.z.abs() > 0.95 { DVec3::Y } else { DVec3::Z };
+    Ok(Camera::look_at(b.center() + direction * distance, b.center(), up, projection)?)
+}
+
+fn of_view(
+    args: &LamarArgs,
+    backend: &mut dyn Backend,
+    tree: &BrickTree,
+    (view, camera): (u32, Camera),
+    (transfer, rays): (&brickfield_core::TransferFunction, Geometry),
+) -> Result<Row, LamarError> {
+    let with = |criterion| scene(args, transfer, camera, rays, &[criterion]);
+    let scenes = [with(Criterion::FullResolution), with(Criterion::ScreenSpaceError { pixels: 1.0 })];
+    let mut contestants = [0, 1].map(|i| Contestant::new(tree, &scenes[i]));
+    let mut last = [None, None];
+    for _ in 0..args.frames {
+        for (contestant, last) in contestants.iter_mut().zip(&mut last) {
+            *last = Some(contestant.frame(backend)?);
+        }
+    }
+    let [Some((full, full_drawn)), Some((pixel, pixel_drawn))] = last else { unreachable!("at least one frame") };
+    Ok(Row {
+        view,
+        backend: backend.describe().backend,
+        full: (full_drawn, contestants[0].spread()),
+        pixel: (pixel_drawn, contestants[1].spread()),
+        error: distance(&pixel, &full.map(f64::from))?,
+    })
+}
+
+fn line(row: &Row) -> String {
+    let ((full, full_ms), (pixel, pixel_ms)) = (row.full, row.pixel);
+    let megabytes = |d: Drawn| d.n_bytes as f64 / 1e6;
+    format!(
+        "{:>4}  {:<7} {:>13} {:>6} {:>12.1} {:>6.1} {:>11.1} {:>7.1} {:>6.2}   {:.2e}   {:.2e}   {:.3}",
+        row.view,
+        row.backend,
+        full.n_bricks,
+        pixel.n_bricks,
+        megabytes(full),
+        megabytes(pixel),
+        full_ms.median,
+        pixel_ms.median,
+        full_ms.median / pixel_ms.median,
+        row.error.max,
+        row.error.rmse,
+        row.error.delta_e_mean,
+    )
+}
+
+fn summary(rows: &[Row]) -> Result<(), LamarError> {
+    let mut names: Vec<&str> = rows.iter().map(|r| r.backend).collect();
+    names.sort_unstable();
+    names.dedup();
+    for name in names {
+        let own = || rows.iter().filter(|r| r.backend == name);
+        let ratio = |f: &dyn Fn(&Row) -> f64| crate::metrics::median(own().map(f).collect());
+        let bricks = ratio(&|r| r.pixel.0.n_bricks as f64 / r.full.0.n_bricks.max(1) as f64);
+        let time = ratio(&|r| r.full.1.median / r.pixel.1.median);
+        let worst = own().map(|r| r.error.max).fold(0.0, f64::max);
+        let rmse = ratio(&|r| r.error.rmse);
+        print(&format!(
+            "\n{name}: medians over views: {:.0} % of the bricks, {time:.2} times as fast, RMSE {rmse:.1e}; greatest difference in any view {worst:.2e}",
+            100.0 * bricks
+        ))?;
+    }
+    Ok(())
+}
