@@ -30,8 +30,9 @@ pub struct LamarArgs {
     /// Only bricks of so many samples a side
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::brick_side)]
     pub sides: Vec<BrickSide>,
-    /// Which bricks multiresolution draws, as `brickfield render --lod`
-    #[arg(long = "lod", value_name = "LIST", value_delimiter = ',', value_parser = values::criterion, default_value = "distance=2")]
+    /// Which bricks multiresolution draws, as `brickfield render --lod`. The paper's factor is 1; at that, bricks of 64 in
+    /// 256^3 voxels are all of level 0 when seen from inside
+    #[arg(long = "lod", value_name = "LIST", value_delimiter = ',', value_parser = values::criterion, default_value = "distance=0.5")]
     pub detail: Vec<Criterion>,
     /// Size of the pictures in pixels
     #[arg(long, value_name = "WxH", value_parser = values::size, default_value = "192x192")]

@@ -58,11 +58,12 @@ pub(super) struct Contestant<'a> {
     scene: &'a Scene,
     residency: Residency,
     ms: Vec<f64>,
+    prepare_ms: Vec<f64>,
 }
 
 impl<'a> Contestant<'a> {
     pub(super) fn new(tree: &'a BrickTree, scene: &'a Scene) -> Contestant<'a> {
-        Contestant { tree, scene, residency: Residency::default(), ms: Vec::new() }
+        Contestant { tree, scene, residency: Residency::default(), ms: Vec::new(), prepare_ms: Vec::new() }
     }
 
     /// A frame from the scene to the picture in memory, selection, order and polygons included; bricks are resident from the
@@ -74,6 +75,7 @@ impl<'a> Contestant<'a> {
         backend.render(&plan).map_err(failed)?;
         let begin = Instant::now();
         let plan = prepare(self.tree, self.scene, &mut self.residency)?;
+        self.prepare_ms.push(begin.elapsed().as_secs_f64() * 1e3);
         let image = backend.render(&plan).map_err(failed)?.image;
         self.ms.push(begin.elapsed().as_secs_f64() * 1e3);
         let drawn = Drawn {
@@ -84,9 +86,14 @@ impl<'a> Contestant<'a> {
         Ok((image, drawn))
     }
 
+    /// Whole frames.
     pub(super) fn spread(&self) -> Spread {
-        let (min, max) = self.ms.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
-        Spread { median: median(self.ms.clone()), min, max }
+        spread(&self.ms)
+    }
+
+    /// Their part before the backend's: selection, order, polygons.
+    pub(super) fn prepare_spread(&self) -> Spread {
+        spread(&self.prepare_ms)
     }
 
     /// Whether a picture is within the rule of its plan's f64 reference; why not, if it is not.
@@ -100,6 +107,11 @@ impl<'a> Contestant<'a> {
         let tolerance = Tolerance::of(&plan, reference, &backend.describe().capabilities)?;
         Ok(tolerance.judge(image, &reference.image).complaint.map(|c| c.to_string()))
     }
+}
+
+fn spread(ms: &[f64]) -> Spread {
+    let (min, max) = ms.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
+    Spread { median: median(ms.to_vec()), min, max }
 }
 
 pub(super) fn distance(image: &Image<f32>, answer: &Image<f64>) -> Result<Distance, LamarError> {

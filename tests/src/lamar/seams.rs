@@ -35,7 +35,7 @@ pub(super) fn camera() -> Result<Camera, LamarError> {
 
 pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, LamarError> {
     let (volume, fog) = cube();
-    let tree = tree(&volume, BrickSide::S16, Downsampling::Average)?;
+    let tree = tree(&volume, BrickSide::S16, Downsampling::Subsample)?;
     let mut missed = seams(args, rivals, &tree, &fog)?;
     missed.extend(figure_8(args, rivals, &tree, &fog)?);
     missed.extend(angles(args, rivals, &tree, &fog)?);

@@ -26,7 +26,7 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, 
          the f64 sum over spherical ones, by pixels along a facet's side; facets lie inside their sphere by the square of their size.\n"
     ))?;
     let (subject, mut missed) = (phantom(), Vec::new());
-    let tree = tree(&subject.volume, BrickSide::S16, Downsampling::Average)?;
+    let tree = tree(&subject.volume, BrickSide::S16, Downsampling::Subsample)?;
     let detail = [Criterion::Distance { factor: 4.0 }];
     let rays = scene(&args, &subject.transfer, subject.camera, geometries(&args)[3], &detail);
     let answer: Image<f64> = reference(&tree, &rays)?.image;

@@ -31,6 +31,8 @@ struct Row {
 struct Cell {
     drawn: Drawn,
     ms: Spread,
+    /// Of those, selection, order and polygons.
+    prepare_ms: Spread,
     error: Distance,
     /// Why the picture is not within the rule of its own cut's f64 reference.
     complaint: Option<String>,
@@ -48,7 +50,7 @@ struct Seat<'a> {
 
 pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, LamarError> {
     print(&format!(
-        "{} x {} pixels, steps of {} voxel(s) of level 0, 2^level of them in coarser bricks; times are medians of {} frames from the\n\
+        "{} x {} pixels, steps of {} voxel(s) of level 0, 2^level of them in coarser bricks (subsampled); times are medians of {} frames from the\n\
          scene to the picture (selection, order and polygons included, bricks resident); errors are against the continuous integral\n\
          at full resolution; \"ok\": within the rule of the f64 sum of the same cut, nothing culled.\n",
         args.size.x, args.size.y, args.step, args.frames
@@ -62,7 +64,7 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, 
         let answers =
             views.map(|(_, camera)| answer(&exhibit.volume, &scene(args, &exhibit.transfer, camera, full, &[])));
         for side in sides(args) {
-            let tree = tree(&exhibit.volume, side, Downsampling::Average)?;
+            let tree = tree(&exhibit.volume, side, Downsampling::Subsample)?;
             for ((view, camera), answer) in views.into_iter().zip(&answers) {
                 let seat = Seat { exhibit: &exhibit, tree: &tree, camera, view, side: side.n_samples(), answer };
                 rows.extend(of_seat(args, rivals, &seat)?);
@@ -115,7 +117,8 @@ fn contest(
     let cell = |i: usize, contestant: &mut Contestant<'_>| -> Result<Cell, LamarError> {
         let (image, drawn) = last[i].as_ref().expect("at least one frame");
         let complaint = contestant.judge(image, &references[i], backend)?;
-        Ok(Cell { drawn: *drawn, ms: contestant.spread(), error: distance(image, seat.answer)?, complaint })
+        let (ms, prepare_ms) = (contestant.spread(), contestant.prepare_spread());
+        Ok(Cell { drawn: *drawn, ms, prepare_ms, error: distance(image, seat.answer)?, complaint })
     };
     let [fixed, multi] = &mut contestants;
     let (fixed, multiresolution) = (cell(0, fixed)?, cell(1, multi)?);

@@ -24,7 +24,7 @@ struct Row {
 
 pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, LamarError> {
     let Phantom { volume, transfer, .. } = phantom_of(UVec3::splat(args.volume_side), ScalarType::U8);
-    let tree = tree(&volume, BrickSide::S32, Downsampling::Average)?;
+    let tree = tree(&volume, BrickSide::S32, Downsampling::Subsample)?;
     print(&format!(
         "The phantom at {}^3, {} views, {} x {} pixels, ray caster, steps of {} voxel(s) times 2^level, bricks of 32. Errors are against\n\
          the same backend's picture at full resolution.\n",
