@@ -17,7 +17,7 @@ pub enum LamarError {
     #[error("--out {}: {source}", path.display())]
     Out { path: PathBuf, source: io::Error },
     #[error(transparent)]
-    Backends(#[from] CompareError),
+    Backends(Box<CompareError>),
     #[error(transparent)]
     Tree(#[from] brickfield::bricks::BuildError),
     #[error(transparent)]
@@ -34,6 +34,12 @@ pub enum LamarError {
     Picture(#[from] brickfield::PictureError),
     #[error("standard output: {0}")]
     Print(io::Error),
+}
+
+impl From<CompareError> for LamarError {
+    fn from(e: CompareError) -> LamarError {
+        LamarError::Backends(Box::new(e))
+    }
 }
 
 impl LamarError {

@@ -154,8 +154,8 @@ fn angles(
 
 /// Every backend, by its place, with every geometry that it draws.
 fn pairs(args: &LamarArgs, rivals: &Rivals) -> Vec<(Geometry, usize)> {
-    let of = |(i, backend): (usize, &Box<dyn Backend>)| geometries_of(args, backend.as_ref()).map(move |g| (g, i));
-    rivals.present.iter().enumerate().flat_map(of).collect()
+    let of = |i: usize| geometries_of(args, rivals.present[i].as_ref()).map(move |g| (g, i));
+    (0..rivals.present.len()).flat_map(of).collect()
 }
 
 /// A cut that depends on nothing but its number: bricks by their distance from some points.

@@ -30,8 +30,8 @@ fn large() -> Volume {
     hills(&Grid::axis_aligned(UVec3::new(71, 66, 53), DVec3::ONE).expect("a grid"), ScalarType::U16)
 }
 
-fn mutants(own: Option<shader::ShaderMutant>, others: &[Mutant]) -> Vec<Mutant> {
-    own.into_iter().map(Mutant::from).chain(others.iter().copied()).collect()
+fn mutants(own: Option<shader::ShaderMutant>, others: Vec<Mutant>) -> Vec<Mutant> {
+    own.into_iter().map(Mutant::from).chain(others).collect()
 }
 
 /// Long steps, of which the surfaces' places show.
@@ -42,7 +42,7 @@ fn placed(volume: Volume, transfer: TransferFunction, placement: Placement) -> S
 fn of_rays() -> Vec<Case> {
     let case = |(placement, own): (Placement, Option<shader::ShaderMutant>)| {
         let name = format!("placement/{}", placement.name());
-        picture(name, mutants(own, &catches![shader::FIRST_NOT_CUT, shader::LAST_DROPPED]), move || {
+        picture(name, mutants(own, catches![shader::FIRST_NOT_CUT, shader::LAST_DROPPED]), move || {
             placed(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), placement)
         })
     };
@@ -58,7 +58,7 @@ fn of_rays() -> Vec<Case> {
 fn of_bricks() -> Vec<Case> {
     let case = |(placement, own): (Placement, Option<shader::ShaderMutant>)| {
         let name = format!("bricks/{}", placement.name());
-        picture(name, mutants(own, &catches![shader::BRICK_NOT_LEFT, shader::FIRST_NOT_CUT]), move || {
+        picture(name, mutants(own, catches![shader::BRICK_NOT_LEFT, shader::FIRST_NOT_CUT]), move || {
             placed(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), placement)
                 .with(|s| s.division = Division::Brick)
         })
