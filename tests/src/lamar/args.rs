@@ -18,7 +18,7 @@ pub struct LamarArgs {
     /// The paper
     #[arg(long, value_enum)]
     pub paper: Paper,
-    /// What is run: table, downsampling and memory unless stated
+    /// What is run: selection, table, downsampling and memory unless stated
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     pub part: Vec<Part>,
     /// The folder of real volumes
@@ -79,6 +79,8 @@ pub enum Paper {
 /// What can be run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Part {
+    /// Figures 4 and 5: how many tiles the distance filter selects
+    Selection,
     /// Table 1: fixed tiles against multiresolution, time and error
     Table,
     /// Section 3.1: subsampling against averaging
@@ -99,6 +101,7 @@ impl Part {
     /// A heading.
     pub const fn title(self) -> &'static str {
         match self {
+            Part::Selection => "Figures 4 and 5: selection",
             Part::Table => "Table 1: fixed tiles against multiresolution",
             Part::Downsampling => "Downsampling: subsampling against averaging",
             Part::Memory => "Memory: shared voxels by the formula, and what is stored",
@@ -114,7 +117,7 @@ impl LamarArgs {
     /// The parts to be run, each once.
     pub fn parts(&self) -> Vec<Part> {
         if self.part.is_empty() {
-            return vec![Part::Table, Part::Downsampling, Part::Memory];
+            return vec![Part::Selection, Part::Table, Part::Downsampling, Part::Memory];
         }
         Part::value_variants().iter().copied().filter(|part| self.part.contains(part)).collect()
     }
@@ -127,7 +130,10 @@ mod tests {
     #[test]
     fn parts_come_once_in_their_order() {
         let parse = |words: &str| LamarArgs::try_parse_from(words.split_whitespace()).unwrap();
-        assert_eq!(parse("compare --paper lamar").parts(), [Part::Table, Part::Downsampling, Part::Memory]);
+        assert_eq!(
+            parse("compare --paper lamar").parts(),
+            [Part::Selection, Part::Table, Part::Downsampling, Part::Memory]
+        );
         let some = parse("compare --paper lamar --part views,seams,views");
         assert_eq!(some.parts(), [Part::Seams, Part::Views]);
         assert_eq!((some.size, some.views, some.volume_side), (UVec2::splat(192), 20, 512));

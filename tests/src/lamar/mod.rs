@@ -1,5 +1,6 @@
 //! LaMar, Hamann and Joy 1999 on this project's data: table 1 with its errors, figures 8 and 14, and what else the paper claims.
 //!
+//! - [`selection`]: how many tiles the distance filter selects, figures 4 and 5.
 //! - [`table`]: fixed tiles against multiresolution, three proxy geometries and the ray caster, time and error on every backend.
 //! - [`downsampling`]: subsampling against averaging. [`memory`]: the formula for shared voxels against what is stored.
 //! - [`seams`]: a constant field, with and without opacity correction. [`shells`]: tessellated shells against spheres.
@@ -13,6 +14,7 @@ mod measure;
 mod memory;
 mod scenes;
 mod seams;
+mod selection;
 mod shells;
 mod table;
 mod views;
@@ -50,6 +52,7 @@ pub fn lamar(args: &LamarArgs) -> Result<Findings, LamarError> {
     for part in args.parts() {
         print(&format!("\n## {}\n", part.title()))?;
         let missed = match part {
+            Part::Selection => selection::run(args)?,
             Part::Table => table::run(args, &mut rivals)?,
             Part::Downsampling => downsampling::run(args)?,
             Part::Memory => memory::run(args)?,
