@@ -10,6 +10,8 @@ mod visibility;
 
 #[cfg(feature = "cli")]
 pub mod options;
+#[cfg(feature = "overlay")]
+pub mod overlay;
 
 pub use backends::{AdapterInfo, BackendError, BackendKind, BackendStatus, Validation, backends, open_backend};
 pub use brickfield_bricks as bricks;
