@@ -9,7 +9,7 @@ use brickfield_frame::{
     Beams, Division, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, Placement, ProxyGeometry, RayFrame,
     Sampling, SamplingError, Steps,
 };
-use brickfield_lod::{Culling, Selection, View, back_to_front, select_cut};
+use brickfield_lod::{Selection, back_to_front, select_cut};
 use brickfield_optics::QuadratureRule;
 
 use crate::visibility::Visibility;
@@ -70,7 +70,7 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
     let sampling = Sampling::new(step_world, scene.rule, scene.mode)?;
     let sampling = sampling.placed(scene.placement)?.divided(scene.division).weighted(scene.lengths)?;
     check_segments(grid.world_box().diagonal() / step_world)?;
-    let selection = select_cut(tree.layout(), grid, &view(scene), &scene.detail);
+    let selection = select_cut(tree.layout(), grid, &scene.view(), &scene.detail);
     let coarsest = selection.drawn().map(|id| id.level).max().unwrap_or(Level(0));
     let steps = Steps::of(&sampling, coarsest);
     let rays = RayFrame::new(&scene.camera, grid, scene.size, &volume_box(tree), &steps);
@@ -123,15 +123,6 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
 fn from_back_to_front(tree: &BrickTree, scene: &Scene, bricks: &[BrickId]) -> Vec<UVec3> {
     let order = back_to_front(tree.layout(), tree.grid(), &scene.camera, bricks);
     order.into_iter().map(|i| bricks[i].coords << u32::from(bricks[i].level.0)).collect()
-}
-
-/// Without skipping, bricks outside the view are kept, too.
-fn view(scene: &Scene) -> View {
-    let culling = match scene.skipping {
-        Skipping::On => Culling::Frustum,
-        Skipping::Off => Culling::Off,
-    };
-    View { camera: scene.camera, size: scene.size, culling }
 }
 
 fn check_technique(scene: &Scene) -> Result<(), PrepareError> {

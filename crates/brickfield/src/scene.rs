@@ -3,7 +3,7 @@
 use brickfield_core::glam::UVec2;
 use brickfield_core::{Aabb, Camera, TransferFunction};
 use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
-use brickfield_lod::Criterion;
+use brickfield_lod::{Criterion, Culling, View};
 use brickfield_optics::QuadratureRule;
 
 /// What to render: everything but the volume.
@@ -77,5 +77,13 @@ impl Scene {
             skipping: Skipping::On,
             technique: Technique::RayCasting,
         }
+    }
+    /// For whom bricks are selected. Without skipping, those outside the view are kept, too.
+    pub fn view(&self) -> View {
+        let culling = match self.skipping {
+            Skipping::On => Culling::Frustum,
+            Skipping::Off => Culling::Off,
+        };
+        View { camera: self.camera, size: self.size, culling }
     }
 }
