@@ -34,7 +34,7 @@ impl Canvas {
         let mut white = Paint::default();
         white.set_color_rgba8(255, 255, 255, 255);
         let width = ink.width * (f64::from(self.image.size().y) / HEIGHT).max(1.0);
-        // Long lines end at their corners, short ones are dots.
+        // Lines that meet at a corner leave no notch there.
         let stroke = Stroke { width: width as f32, line_cap: LineCap::Round, ..Stroke::default() };
         coverage.fill(tiny_skia::Color::TRANSPARENT);
         coverage.stroke_path(&path, &white, &stroke, Transform::identity(), None);

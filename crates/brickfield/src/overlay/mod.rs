@@ -59,7 +59,7 @@ const CAMERA_HALO: Ink = Ink { color: [1.0; 3], opacity: 0.7, width: 3.25 };
 /// The picture of `camera`, with the edges of the boxes of `bricks` ([`BrickLayout::index_box`]) over it.
 ///
 /// An edge has the [`LevelColor`] of the coarsest brick that has it, and is drawn once. The finer the level, the thinner and
-/// lighter: 0.75 + level / 4 pixels wide (at most 2) and opaque by 0.5 + level / 8 (at most 1) in a picture up to 512 pixels high;
+/// lighter: 0.75 + level / 4 pixels wide (at most 2) and opaque by 0.6 + level / 8 (at most 1) in a picture up to 512 pixels high;
 /// in higher ones lines are wider in proportion. What lies behind the eye is not drawn.
 ///
 /// Composited over the picture in linear light; a pixel that no line crosses is the same to the bit.
@@ -106,7 +106,7 @@ fn show(
 
 fn of_level_ink(level: Level) -> Ink {
     let l = f64::from(level.0);
-    Ink { color: LevelColor::of(level).linear(), opacity: (0.5 + l / 8.0).min(1.0), width: (0.75 + l / 4.0).min(2.0) }
+    Ink { color: LevelColor::of(level).linear(), opacity: (0.6 + l / 8.0).min(1.0), width: (0.75 + l / 4.0).min(2.0) }
 }
 
 /// The picture of `camera`, with another camera over it: the pyramid that a picture of `of_size` taken by `of` sees up to the
