@@ -71,8 +71,87 @@ fn criteria_are_listed_or_repeated() {
     assert!(!both.contains("error:"), "{both}");
 }
 
+const SMALL: &str = "--backend|cpu|--size|24x18";
+
+impl Place {
+    /// What is printed for a picture that is written.
+    fn rendered(&self, picture: &str, words: &str) -> String {
+        let out = self.run(&format!("render|a.nrrd|-o|{picture}|{SMALL}{words}"));
+        assert_eq!(out.status.code(), Some(0), "{words}: {}", text(&out.stderr));
+        text(&out.stdout)
+    }
+
+    fn pixels(&self, words: &str) -> Vec<u8> {
+        self.rendered("a.png", words);
+        image::open(self.path().join("a.png")).unwrap().to_rgb8().into_raw()
+    }
+}
+
+#[test]
+fn what_a_picture_was_sampled_with_is_printed_and_kept() {
+    let place = Place::new();
+    let polygons = "divide bricks, lengths true, rays cast to the samples of polygons";
+    for (words, expected) in [
+        ("", "placement shells, divide rays, lengths true, rays cast\n".to_owned()),
+        ("|--placement|tessellated-shells=5", "placement tessellated-shells=5, divide rays".to_owned()),
+        (
+            "|--placement|viewport-planes|--lengths|nominal",
+            "placement viewport-planes, divide rays, lengths nominal".to_owned(),
+        ),
+        (
+            "|--placement|object-planes|--divide|bricks",
+            "placement object-planes, divide bricks, lengths true, rays cast\n".to_owned(),
+        ),
+        ("|--polygons|rgba32float", format!("placement tessellated-shells=16, {polygons} rgba32float")),
+        (
+            "|--polygons|rgba16float|--divide|bricks|--placement|object-planes",
+            format!("placement object-planes, {polygons} rgba16float"),
+        ),
+    ] {
+        let said = place.rendered("a.exr", words);
+        assert!(said.contains(&expected), "{words}: {said}");
+        let file = text(&std::fs::read(place.path().join("a.exr")).unwrap());
+        assert!(file.contains(expected.trim_end()) && !file.contains("overlay"), "{words}");
+    }
+}
+
+#[test]
+fn polygons_imply_tessellated_shells_and_bricks() {
+    let place = Place::new();
+    let implied = place.pixels("|--polygons|rgba32float");
+    assert_eq!(implied, place.pixels("|--placement|tessellated-shells|--divide|bricks"));
+    assert!(implied.iter().any(|c| *c > 0));
+}
+
+#[test]
+fn bricks_are_shown_over_the_picture_and_in_the_legend() {
+    let place = Place::new();
+    let (plain, shown) = (place.pixels(""), place.pixels("|--show-bricks"));
+    let n_changed = plain.chunks(3).zip(shown.chunks(3)).filter(|(a, b)| a != b).count();
+    assert!(plain.len() == shown.len() && (20..24 * 18 / 2).contains(&n_changed), "{n_changed}");
+    let said = place.rendered("a.exr", "|--show-bricks=drawn");
+    assert!(said.contains("boxes: 1 of level 0 (sky blue)"), "{said}");
+    assert!(text(&std::fs::read(place.path().join("a.exr")).unwrap()).contains("drawn bricks as boxes"));
+}
+
+#[test]
+fn bricks_that_show_nothing_are_boxes_only_if_all_are_asked_for() {
+    let place = Place::new();
+    let knot = |value: f64, extinction: f64| {
+        format!(r##"{{"value": {value}, "extinction": {extinction}, "srgb": "#ffffff"}}"##)
+    };
+    let knots = format!(r#"{{"knots": [{}, {}]}}"#, knot(900.0, 0.0), knot(901.0, 1.0));
+    std::fs::write(place.path().join("dark.json"), knots).unwrap();
+    let said = place.rendered("a.exr", "|--transfer|dark.json|--show-bricks=all");
+    assert!(said.contains("boxes: none"), "{said}");
+    assert!(place.pixels("|--transfer|dark.json|--show-bricks=drawn").iter().all(|c| *c == 0));
+    assert!(place.pixels("|--transfer|dark.json|--show-bricks=all").iter().any(|c| *c > 0));
+    // What is drawn is not drawn again.
+    assert_eq!(place.pixels("|--show-bricks=all"), place.pixels("|--show-bricks"));
+}
+
 /// Arguments after `render`, the status, and what the message must hold.
-const REFUSED: [(&str, i32, &str); 25] = [
+const REFUSED: [(&str, i32, &str); 34] = [
     ("b.nrrd|-o|a.png", 1, "b.nrrd"),
     ("a.nrrd|-o|a.jpg", 2, "a.jpg: pictures are written as .exr or .png"),
     ("a.nrrd|-o|no/a.png", 2, "no/a.png: there is no folder no"),
@@ -95,6 +174,15 @@ const REFUSED: [(&str, i32, &str); 25] = [
     ("a.nrrd|-o|a.png|--clip|20:30,0:1,0:1", 2, "--clip: the box from"),
     ("a.nrrd|-o|a.png|--transfer|none such", 2, "--transfer: \"none such\""),
     ("a.nrrd|-o|a.png|--max-mib|0", 2, "--max-mib"),
+    ("a.nrrd|-o|a.png|--placement|spheres", 2, "\"spheres\" is not shells, tessellated-shells[=PIXELS]"),
+    ("a.nrrd|-o|a.png|--placement|tessellated-shells=0", 2, "a whole number 1 to 32768"),
+    ("a.nrrd|-o|a.png|--placement|shells=3", 2, "\"shells=3\" is not shells"),
+    ("a.nrrd|-o|a.png|--divide|shells", 2, "rays or bricks"),
+    ("a.nrrd|-o|a.png|--polygons|rgba8unorm", 2, "rgba32float or rgba16float"),
+    ("a.nrrd|-o|a.png|--polygons|rgba16float|--placement|shells", 2, "--polygons rgba16float and --placement shells"),
+    ("a.nrrd|-o|a.png|--divide|rays|--polygons|rgba32float", 2, "--polygons rgba32float and --divide rays"),
+    ("a.nrrd|-o|a.png|--lengths|nominal|--rule|gauss2", 2, "--lengths nominal and --rule gauss2 exclude each other"),
+    ("a.nrrd|-o|a.png|--show-bricks=hidden", 2, "drawn or all"),
     ("a.nrrd|-o|a.png|--validation|--backend|cpu", 2, "--validation"),
     ("a.nrrd|-o|.|--size|8x8", 2, "exr or .png"),
     ("a.nrrd|-o|a.png|--raw|99x99x99,u8", 1, "a.nrrd"),

@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 use brickfield_bricks::{BrickTree, BuildOptions, Downsampling, build_tree_observed};
 use brickfield_core::glam::{UVec2, UVec3};
 use brickfield_core::{Aabb, BrickSide, Grid, Level, LinearRgb, TransferFunction, Volume};
-use brickfield_frame::Mode;
+use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
 use brickfield_io::{Limits, Opened, RawSpec, WorldFrame};
 use brickfield_lod::Criterion;
 use brickfield_optics::{Preset, QuadratureRule};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::{Scene, Skipping, Viewpoint};
+use crate::{Scene, Skipping, Technique, Viewpoint};
 
 /// How a file is read.
 #[derive(Args, Clone, Debug)]
@@ -84,6 +84,15 @@ fn presets() -> String {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Background(pub LinearRgb);
 
+/// Which bricks are shown as boxes over a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Boxes {
+    /// Those that the frame draws.
+    Drawn,
+    /// Those, and fainter the selected ones in which nothing is visible.
+    All,
+}
+
 /// How rays are sampled.
 #[derive(Args, Clone, Debug)]
 pub struct SamplingOptions {
@@ -96,6 +105,23 @@ pub struct SamplingOptions {
     /// Quadrature rule: left-riemann, left-exponential, midpoint, pre-integrated or gauss2
     #[arg(long, default_value = "midpoint", value_parser = values::rule)]
     pub rule: QuadratureRule,
+    /// Surfaces between which samples lie: shells (spheres around the eye), tessellated-shells[=PIXELS] (their triangles:
+    /// squares of PIXELS, 16, cut in two), viewport-planes (parallel to the picture) or object-planes (of constant x, y or z);
+    /// shells unless stated, tessellated-shells with --polygons
+    #[arg(long, value_name = "SURFACES", value_parser = values::placement)]
+    pub placement: Option<Placement>,
+    /// What is divided into segments: rays (all are as long), or bricks (a ray's way through each, at distances that double
+    /// with its level); rays unless stated, bricks with --polygons
+    #[arg(long, value_name = "WHAT", value_parser = values::division)]
+    pub divide: Option<Division>,
+    /// For which length the light through a sample is computed: true (the segment's) or nominal (the step, whatever the
+    /// angle; with --rule midpoint)
+    #[arg(long, value_name = "WHICH", default_value = "true", value_parser = values::lengths)]
+    pub lengths: Lengths,
+    /// Rasterise and blend polygons instead of casting rays, into rgba32float or rgba16float; the cpu backend casts rays to
+    /// their samples
+    #[arg(long, value_name = "TARGET", value_parser = values::target)]
+    pub polygons: Option<Target>,
     /// Upload and sample transparent bricks too (to measure what leaving them out saves)
     #[arg(long)]
     pub no_skip: bool,
@@ -133,6 +159,8 @@ pub enum OptionError {
     Camera(#[from] brickfield_core::CameraError),
     #[error("--clip: the box from {} to {} lies outside of the volume's {} x {} x {} voxels", clip.min, clip.max, dims.x, dims.y, dims.z)]
     ClipOutside { clip: Aabb, dims: UVec3 },
+    #[error("{first} and {second} exclude each other: {reason}")]
+    Exclude { first: String, second: String, reason: &'static str },
 }
 
 impl OptionError {
@@ -140,7 +168,10 @@ impl OptionError {
     pub fn is_usage(&self) -> bool {
         match self {
             OptionError::Open(_) | OptionError::Build(_) | OptionError::Preset(_) | OptionError::Transfer(_) => false,
-            OptionError::NoSuchTransfer { .. } | OptionError::Camera(_) | OptionError::ClipOutside { .. } => true,
+            OptionError::NoSuchTransfer { .. }
+            | OptionError::Camera(_)
+            | OptionError::ClipOutside { .. }
+            | OptionError::Exclude { .. } => true,
         }
     }
 }
@@ -238,13 +269,49 @@ impl ViewOptions {
 
 impl SamplingOptions {
     /// The scene, sampled as asked for.
-    pub fn of(&self, scene: Scene) -> Scene {
-        Scene {
+    ///
+    /// # Errors
+    /// Options that exclude each other.
+    pub fn of(&self, scene: Scene) -> Result<Scene, OptionError> {
+        self.check()?;
+        let tessellated = Placement::TessellatedShells { facet_pixels: values::FACET_PIXELS };
+        // Without polygons, as by default.
+        let (technique, placement, division) = match self.polygons {
+            Some(target) => (Technique::Polygons(target), tessellated, Division::Brick),
+            None => Default::default(),
+        };
+        Ok(Scene {
             step_voxels: self.step,
             rule: self.rule,
             mode: self.mode,
+            placement: self.placement.unwrap_or(placement),
+            division: self.divide.unwrap_or(division),
+            lengths: self.lengths,
+            technique,
             skipping: if self.no_skip { Skipping::Off } else { Skipping::On },
             ..scene
+        })
+    }
+
+    /// `prepare` refuses the same; here the options are known by name.
+    fn check(&self) -> Result<(), OptionError> {
+        let exclude = |first: String, second: String, reason| Err(OptionError::Exclude { first, second, reason });
+        let polygons = || format!("--polygons {}", self.polygons.map_or("", Target::name));
+        match (self.polygons, self.placement, self.divide, self.lengths, self.rule) {
+            (Some(_), Some(Placement::Shells), ..) => exclude(
+                polygons(),
+                "--placement shells".to_owned(),
+                "a sphere has no polygons; take tessellated-shells",
+            ),
+            (Some(_), _, Some(Division::Ray), ..) => {
+                exclude(polygons(), "--divide rays".to_owned(), "polygons are clipped to bricks")
+            }
+            (.., Lengths::Nominal, rule) if rule != QuadratureRule::MidpointExponential => exclude(
+                "--lengths nominal".to_owned(),
+                format!("--rule {}", rule.name()),
+                "the one node must be the segment's middle; take --rule midpoint",
+            ),
+            _ => Ok(()),
         }
     }
 }

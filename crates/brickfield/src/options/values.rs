@@ -4,13 +4,19 @@
 use brickfield_bricks::Downsampling;
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Aabb, BrickSide, Level, ScalarType, WorldPos};
-use brickfield_frame::Mode;
+use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
 use brickfield_io::{ByteOrder, RawSpec};
 use brickfield_lod::Criterion;
 use brickfield_optics::QuadratureRule;
 
-use super::Background;
+use super::{Background, Boxes};
 use crate::MAX_IMAGE;
+
+/// Pixels along a facet of tessellated shells where none are asked for.
+pub const FACET_PIXELS: u32 = 16;
+const DIVISIONS: [(&str, Division); 2] = [("rays", Division::Ray), ("bricks", Division::Brick)];
+const LENGTHS: [(&str, Lengths); 2] = [("true", Lengths::True), ("nominal", Lengths::Nominal)];
+const BOXES: [(&str, Boxes); 2] = [("drawn", Boxes::Drawn), ("all", Boxes::All)];
 
 /// A number above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
@@ -127,6 +133,76 @@ pub fn mode(text: &str) -> Result<Mode, String> {
 pub fn rule(text: &str) -> Result<QuadratureRule, String> {
     let names = || QuadratureRule::ALL.map(|r| r.name()).join(", ");
     QuadratureRule::from_name(text).ok_or_else(|| format!("one of {}", names()))
+}
+
+/// The surfaces between which segments lie.
+pub fn placement(text: &str) -> Result<Placement, String> {
+    let tessellated = Placement::TessellatedShells { facet_pixels: FACET_PIXELS };
+    let all = [Placement::Shells, tessellated, Placement::ViewportPlanes, Placement::ObjectPlanes];
+    match text.split_once('=') {
+        Some((name, pixels)) if name == tessellated.name() => facets(pixels),
+        Some(_) => None,
+        None => all.into_iter().find(|p| p.name() == text),
+    }
+    .ok_or_else(|| {
+        let most = Placement::MOST_FACET_PIXELS;
+        format!(
+            "{text:?} is not shells, tessellated-shells[=PIXELS] with PIXELS a whole number 1 to {most}, viewport-planes or \
+             object-planes"
+        )
+    })
+}
+
+fn facets(pixels: &str) -> Option<Placement> {
+    let facet_pixels = pixels.parse().ok().filter(|n| (1..=Placement::MOST_FACET_PIXELS).contains(n))?;
+    Some(Placement::TessellatedShells { facet_pixels })
+}
+
+/// Surfaces as an option names them.
+pub fn placement_text(placement: Placement) -> String {
+    match placement {
+        Placement::TessellatedShells { facet_pixels } => format!("{}={facet_pixels}", placement.name()),
+        _ => placement.name().to_owned(),
+    }
+}
+
+/// What is divided into segments.
+pub fn division(text: &str) -> Result<Division, String> {
+    named(&DIVISIONS, text)
+}
+
+/// What is divided into segments, as an option names it.
+pub fn division_text(division: Division) -> &'static str {
+    name_of(&DIVISIONS, division)
+}
+
+/// For which lengths light is computed.
+pub fn lengths(text: &str) -> Result<Lengths, String> {
+    named(&LENGTHS, text)
+}
+
+/// For which lengths light is computed, as an option names it.
+pub fn lengths_text(lengths: Lengths) -> &'static str {
+    name_of(&LENGTHS, lengths)
+}
+
+/// What polygons are blended into.
+pub fn target(text: &str) -> Result<Target, String> {
+    named(&[Target::Float32, Target::Float16].map(|t| (t.name(), t)), text)
+}
+
+/// Which bricks are shown as boxes.
+pub fn boxes(text: &str) -> Result<Boxes, String> {
+    named(&BOXES, text)
+}
+
+fn named<T: Copy>(all: &[(&str, T)], text: &str) -> Result<T, String> {
+    let names = || all.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(" or ");
+    all.iter().find(|(name, _)| *name == text).map(|(_, value)| *value).ok_or_else(names)
+}
+
+fn name_of<T: PartialEq>(all: &[(&'static str, T)], value: T) -> &'static str {
+    all.iter().find(|(_, v)| *v == value).map_or("", |(name, _)| name)
 }
 
 /// How raw voxels lie.

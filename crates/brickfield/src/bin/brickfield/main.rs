@@ -7,7 +7,8 @@ use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use brickfield::options::{InputOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions};
+use brickfield::options::{Boxes, InputOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions, values};
+use brickfield::overlay::LEVEL_COLORS;
 use brickfield::{AdapterInfo, BackendError, BackendKind, BackendStatus, Validation, backends};
 use clap::{Args, Parser, Subcommand};
 
@@ -22,7 +23,9 @@ use clap::{Args, Parser, Subcommand};
   brickfield info head.nrrd
   brickfield render head.nrrd -o head.png
   brickfield render dicom-folder/ -o head.exr --transfer ct-bone --camera \"front zoom=1.2\"
-  brickfield render engine.vti -o inside.png --camera \"eye=80,100,60 target=200,128,60 up=0,0,1 fov=60\" --mode fast"
+  brickfield render engine.vti -o inside.png --camera \"eye=80,100,60 target=200,128,60 up=0,0,1 fov=60\" --mode fast
+  brickfield render head.nrrd -o bricks.png --lod error=2 --show-bricks
+  brickfield render head.nrrd -o planes.exr --polygons rgba16float --placement object-planes"
 )]
 struct Cli {
     #[command(subcommand)]
@@ -73,6 +76,18 @@ struct RenderArgs {
     view: ViewOptions,
     #[command(flatten)]
     sampling: SamplingOptions,
+    #[arg(long, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "drawn",
+          value_parser = values::boxes, help = show_bricks_help())]
+    show_bricks: Option<Boxes>,
+}
+
+fn show_bricks_help() -> String {
+    let colors: Vec<_> = LEVEL_COLORS.iter().map(|c| c.name).collect();
+    format!(
+        "Draw the boxes of bricks over the picture, coloured by level, from the finest: {}, and again. drawn: those that \
+         the frame draws; all: and, fainter, those that are selected but show nothing",
+        colors.join(", ")
+    )
 }
 
 /// Why the command failed, by exit status.

@@ -1,8 +1,15 @@
 //! `brickfield render`.
 
+use std::collections::HashSet;
+
+use brickfield::core::{BrickId, Image, Level};
 use brickfield::frame::{Backend, Frame, FramePlan};
-use brickfield::options::Subject;
-use brickfield::{BackendError, Residency, Scene, check_picture_path, open_backend, prepare, write_picture};
+use brickfield::lod::select_cut;
+use brickfield::options::{Boxes, Subject, values};
+use brickfield::overlay::{LevelColor, show_bricks, show_bricks_faintly};
+use brickfield::{
+    BackendError, BackendKind, Residency, Scene, Technique, check_picture_path, open_backend, prepare, write_picture,
+};
 
 use crate::{Failure, RenderArgs, print};
 
@@ -11,17 +18,24 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     check_picture_path(&args.out).map_err(Failure::usage)?;
     let mut backend = open(args)?;
     let subject = Subject::open(&args.file, &args.input, &args.tree, &args.view)?;
-    let scene = args.sampling.of(args.view.scene(&subject)?);
-    let plan = prepare(&subject.tree, &scene, &mut Residency::default()).map_err(Failure::usage)?;
+    let scene = args.sampling.of(args.view.scene(&subject)?)?;
+    let mut residency = Residency::default();
+    let plan = prepare(&subject.tree, &scene, &mut residency).map_err(Failure::usage)?;
     if plan.visible.is_empty() {
         eprintln!(
             "note: nothing is visible: the transfer function is 0 over all values inside the clip box and the view"
         );
     }
-    let frame = backend.render(&plan)?;
-    let attributes = attributes(args, backend.as_ref(), &scene);
+    let mut frame = backend.render(&plan)?;
+    if let Some(boxes) = args.show_bricks {
+        frame.image = with_boxes(&frame.image, &subject, &scene, residency.bricks(), boxes);
+    }
+    let attributes = attributes(args, backend.as_ref(), &scene, &plan);
     write_picture(&args.out, &frame.image, args.view.background.0, &attributes)?;
-    print(&summary(backend.as_ref(), &plan, &frame))?;
+    print(&summary(backend.as_ref(), &scene, &plan, &frame))?;
+    if args.show_bricks.is_some() {
+        print(&legend(residency.bricks()))?;
+    }
     check_validation(&backend.validation_messages())
 }
 
@@ -42,26 +56,74 @@ fn open(args: &RenderArgs) -> Result<Box<dyn Backend>, Failure> {
     Err(Failure::Backend(last.expect("at least one candidate")))
 }
 
-fn attributes(args: &RenderArgs, backend: &dyn Backend, scene: &Scene) -> Vec<(&'static str, String)> {
+/// The picture with the boxes of the bricks that were drawn over it.
+fn with_boxes(image: &Image, subject: &Subject, scene: &Scene, drawn: &[BrickId], boxes: Boxes) -> Image {
+    let (grid, layout) = (subject.tree.grid(), subject.tree.layout());
+    let under = match boxes {
+        Boxes::Drawn => None,
+        Boxes::All => {
+            let selection = select_cut(layout, grid, &scene.view(), &scene.detail);
+            let drawn: HashSet<BrickId> = drawn.iter().copied().collect();
+            let others: Vec<_> = selection.drawn().filter(|id| !drawn.contains(id)).collect();
+            Some(show_bricks_faintly(image, &scene.camera, grid, layout, &others))
+        }
+    };
+    show_bricks(under.as_ref().unwrap_or(image), &scene.camera, grid, layout, drawn)
+}
+
+/// How many bricks of each level are shown, and in which colour.
+fn legend(bricks: &[BrickId]) -> String {
+    let of_level = |level: Level| {
+        let n = bricks.iter().filter(|id| id.level == level).count();
+        (n > 0).then(|| format!("{n} of level {} ({})", level.0, LevelColor::of(level).name))
+    };
+    let levels: Vec<_> = (0..32).map(Level).filter_map(of_level).collect();
+    format!("boxes: {}\n", if levels.is_empty() { "none".to_owned() } else { levels.join(", ") })
+}
+
+fn attributes(
+    args: &RenderArgs,
+    backend: &dyn Backend,
+    scene: &Scene,
+    plan: &FramePlan,
+) -> Vec<(&'static str, String)> {
     let d = backend.describe();
-    vec![
+    let boxes = args.show_bricks.map(|boxes| ("overlay", format!("{boxes:?} bricks as boxes").to_lowercase()));
+    let mut attributes = vec![
         ("scene", format!("{} {:?}", args.file.display(), scene)),
         ("backend", d.backend.to_owned()),
         ("adapter", format!("{} ({})", d.adapter, d.driver)),
         ("step", format!("{} voxels", scene.step_voxels)),
-    ]
+        ("sampling", sampling(backend, scene, plan)),
+    ];
+    attributes.extend(boxes);
+    attributes
 }
 
-fn summary(backend: &dyn Backend, plan: &FramePlan, frame: &Frame) -> String {
+/// Where samples lie and what is made of them, in the words of the options.
+fn sampling(backend: &dyn Backend, scene: &Scene, plan: &FramePlan) -> String {
+    let technique = match (scene.technique, &plan.proxy) {
+        (Technique::Polygons(target), _) if backend.describe().backend == BackendKind::Cpu.name() => {
+            format!("rays cast to the samples of polygons {}", target.name())
+        }
+        (Technique::Polygons(target), Some(proxy)) => format!("{} polygons {}", proxy.n_polygons(), target.name()),
+        _ => "rays cast".to_owned(),
+    };
+    let (division, lengths) = (values::division_text(scene.division), values::lengths_text(scene.lengths));
+    format!("placement {}, divide {division}, lengths {lengths}, {technique}", values::placement_text(scene.placement))
+}
+
+fn summary(backend: &dyn Backend, scene: &Scene, plan: &FramePlan, frame: &Frame) -> String {
     let d = backend.describe();
     let t = frame.timing;
     let device = t.device_ms.map(|ms| format!(", device {ms:.1} ms")).unwrap_or_default();
     let mib = plan.bricks.bytes().len() as f64 / f64::from(1 << 20);
     format!(
-        "{}: {} ({})\n{} bricks, {mib:.1} MiB\nupload {:.1} ms, render {:.1} ms{device}, read back {:.1} ms\n",
+        "{}: {} ({})\n{}\n{} bricks, {mib:.1} MiB\nupload {:.1} ms, render {:.1} ms{device}, read back {:.1} ms\n",
         d.backend,
         d.adapter,
         d.driver,
+        sampling(backend, scene, plan),
         plan.bricks.n_bricks(),
         t.upload_ms,
         t.wall_ms,
