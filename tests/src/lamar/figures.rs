@@ -1,8 +1,178 @@
 //! Figures 8 and 14 as pictures.
 
-use super::{LamarArgs, LamarError};
-use crate::compare::rivals::Rivals;
+use brickfield::bricks::{BrickTree, Downsampling};
+use brickfield::frame::{Backend, Lengths};
+use brickfield::lod::Criterion;
+use brickfield::overlay::{show_bricks, show_camera};
+use brickfield::{Residency, Scene, Viewpoint, prepare, write_exr, write_png};
+use brickfield_core::glam::UVec2;
+use brickfield_core::{BrickId, BrickSide, Camera, Image};
 
-pub(super) fn run(_: &LamarArgs, _: &mut Rivals) -> Result<Vec<String>, LamarError> {
+use super::scenes::{Exhibit, Geometry, exhibits, geometries, geometries_of, scene, tree, views};
+use super::seams::{camera as cube_camera, cube};
+use super::{LamarArgs, LamarError, print};
+use crate::compare::rivals::Rivals;
+use crate::report::heat;
+
+/// Behind transparent pixels.
+const BACKGROUND: [f64; 3] = [0.02, 0.02, 0.025];
+/// Bricks' side in figure 14: the paper's.
+const SIDE: BrickSide = BrickSide::S16;
+
+pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, LamarError> {
+    // The last is a rasteriser, if there is one.
+    let Some(backend) = rivals.present.last_mut() else { return Ok(Vec::new()) };
+    figure_8(args, backend.as_mut())?;
+    for exhibit in exhibits(args)? {
+        figure_14(args, backend.as_mut(), &exhibit?)?;
+    }
     Ok(Vec::new())
+}
+
+/// The constant cube, its bricks of several levels: each geometry without correction, with it, and the difference times 4.
+fn figure_8(args: &LamarArgs, backend: &mut dyn Backend) -> Result<(), LamarError> {
+    let (volume, fog) = cube();
+    let tree = tree(&volume, SIDE, Downsampling::Subsample)?;
+    let detail = [Criterion::Distance { factor: 1.5 }];
+    let mut rows: [Vec<Image<f32>>; 3] = Default::default();
+    for geometry in geometries(args).into_iter().take(3) {
+        let geometry = drawable(args, backend, geometry);
+        let of = |lengths| Scene { lengths, ..scene(args, &fog, cube_camera().expect("a camera"), geometry, &detail) };
+        let nominal = render(&tree, &of(Lengths::Nominal), backend)?.0;
+        let truth = render(&tree, &of(Lengths::True), backend)?.0;
+        rows[2].push(difference(&nominal, &truth, 4.0));
+        rows[0].push(nominal);
+        rows[1].push(truth);
+    }
+    let what = "object planes, viewport planes, shells; uncorrected, corrected, 4 x the difference";
+    write(args, "figure8", &stacked(&rows.map(|row| beside(&row))), what)
+}
+
+/// From the surface and from inside: the bricks and the picture, with fixed tiles and with multiresolution.
+fn figure_14(args: &LamarArgs, backend: &mut dyn Backend, exhibit: &Exhibit) -> Result<(), LamarError> {
+    let tree = tree(&exhibit.volume, SIDE, Downsampling::Subsample)?;
+    let overview: Viewpoint = "oblique zoom=0.7".parse().expect("a viewpoint");
+    let overview = overview.camera(exhibit.volume.grid(), exhibit.frame, args.size)?;
+    let mut rows = Vec::new();
+    for (_, camera) in views(exhibit, args.size)?.into_iter().skip(1) {
+        let mut panels = Vec::new();
+        for detail in [vec![Criterion::FullResolution], args.detail.clone()] {
+            let scene = scene(args, &exhibit.transfer, camera, geometries(args)[3], &detail);
+            let (picture, bricks) = render(&tree, &scene, backend)?;
+            panels.extend([boxes(&tree, &overview, &camera, &bricks, args.size), picture]);
+        }
+        rows.push(beside(&panels));
+    }
+    let name =
+        exhibit.name.rsplit('/').next().unwrap_or(&exhibit.name).split('.').next().unwrap_or_default().to_owned();
+    let what = "from the surface, from inside; fixed tiles and their picture, multiresolution and its picture";
+    write(args, &format!("figure14-{name}"), &stacked(&rows), what)
+}
+
+/// Without a rasteriser the same samples, by rays.
+fn drawable(args: &LamarArgs, backend: &dyn Backend, geometry: Geometry) -> Geometry {
+    match geometries_of(args, backend).any(|own| own == geometry) {
+        true => geometry,
+        false => Geometry { technique: brickfield::Technique::RayCasting, ..geometry },
+    }
+}
+
+fn render(
+    tree: &BrickTree,
+    scene: &Scene,
+    backend: &mut dyn Backend,
+) -> Result<(Image<f32>, Vec<BrickId>), LamarError> {
+    let mut residency = Residency::default();
+    let plan = prepare(tree, scene, &mut residency)?;
+    let name = backend.describe().backend;
+    let frame = backend.render(&plan).map_err(|source| LamarError::Render { backend: name, source })?;
+    Ok((frame.image, residency.bricks().to_vec()))
+}
+
+/// The bricks that a camera draws, and the camera, from outside.
+fn boxes(tree: &BrickTree, overview: &Camera, camera: &Camera, bricks: &[BrickId], size: UVec2) -> Image<f32> {
+    let nothing = Image::transparent(size);
+    let grid = tree.grid();
+    let drawn = show_bricks(&nothing, overview, grid, tree.layout(), bricks);
+    show_camera(&drawn, overview, camera, size, 0.12 * grid.world_box().diagonal())
+}
+
+/// Where and how much two pictures differ, as the report's heat.
+fn difference(a: &Image<f32>, b: &Image<f32>, gain: f64) -> Image<f32> {
+    let mut out = a.clone();
+    for (to, from) in out.pixels_mut().iter_mut().zip(b.pixels()) {
+        let greatest = to.iter().zip(from).map(|(x, y)| f64::from((x - y).abs())).fold(0.0, f64::max);
+        let [r, g, b] = heat(gain * greatest).map(|c| (f32::from(c) / 255.0).powf(2.2));
+        *to = [r, g, b, 1.0];
+    }
+    out
+}
+
+/// Pictures of one height, side by side, a few pixels apart.
+fn beside(images: &[Image<f32>]) -> Image<f32> {
+    joined(
+        images,
+        |at, size| UVec2::new(at.x + size.x + GAP, 0),
+        |at, size| UVec2::new(at.x + size.x, size.y.max(at.y)),
+    )
+}
+
+/// Pictures of one width, from top to bottom.
+fn stacked(images: &[Image<f32>]) -> Image<f32> {
+    joined(
+        images,
+        |at, size| UVec2::new(0, at.y + size.y + GAP),
+        |at, size| UVec2::new(size.x.max(at.x), at.y + size.y),
+    )
+}
+
+/// Pixels between panels.
+const GAP: u32 = 4;
+
+fn joined(
+    images: &[Image<f32>],
+    next: impl Fn(UVec2, UVec2) -> UVec2,
+    end: impl Fn(UVec2, UVec2) -> UVec2,
+) -> Image<f32> {
+    let mut corner = UVec2::ZERO;
+    let corners: Vec<UVec2> = images
+        .iter()
+        .map(|image| {
+            let own = corner;
+            corner = next(own, image.size());
+            own
+        })
+        .collect();
+    let size = images.iter().zip(&corners).fold(UVec2::ZERO, |size, (image, at)| size.max(end(*at, image.size())));
+    let mut out = Image::transparent(size);
+    for (image, at) in images.iter().zip(corners) {
+        for (y, row) in image.pixels().chunks_exact(image.size().x.max(1) as usize).enumerate() {
+            let start = at.x as usize + size.x as usize * (at.y as usize + y);
+            out.pixels_mut()[start..start + row.len()].copy_from_slice(row);
+        }
+    }
+    out
+}
+
+fn write(args: &LamarArgs, name: &str, image: &Image<f32>, what: &str) -> Result<(), LamarError> {
+    write_exr(&args.out.join(format!("{name}.exr")), image, &[("figure", what.to_owned())])?;
+    let path = args.out.join(format!("{name}.png"));
+    write_png(&path, image, BACKGROUND)?;
+    print(&format!("{}: {what}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn panels_lie_beside_and_below_each_other() {
+        let image = |value: f32| Image::new(UVec2::new(3, 2), vec![[value; 4]; 6]).unwrap();
+        let row = beside(&[image(0.25), image(0.5)]);
+        assert_eq!(row.size(), UVec2::new(6 + GAP, 2));
+        assert_eq!((row.pixels()[2][0], row.pixels()[3][0], row.pixels()[3 + GAP as usize][0]), (0.25, 0.0, 0.5));
+        let all = stacked(&[row.clone(), row]);
+        assert_eq!(all.size(), UVec2::new(6 + GAP, 4 + GAP));
+        assert_eq!(all.pixels().last(), Some(&[0.5; 4]));
+    }
 }
