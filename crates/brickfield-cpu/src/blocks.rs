@@ -1,7 +1,7 @@
 //! The blocks that a ray crosses, one after the other.
 
+use brickfield_core::Span;
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Aabb, Span};
 use brickfield_frame::{FramePlan, IndexEntry, PlanRay};
 
 /// A ray's way through a block.
@@ -92,20 +92,4 @@ impl Iterator for Blocks<'_> {
         }
         None
     }
-}
-
-/// The box of a block, relative to the frame's centre, as far as it lies in the domain.
-pub(crate) fn block_box(plan: &FramePlan, crossing: &Crossing) -> Aabb {
-    let n_cells = f64::from(plan.bricks.side().n_cells());
-    let level = u32::from(crossing.entry.level().0);
-    let low = crossing.cell >> level << level;
-    let high = low + crossing.entry.level().stride();
-    let is_first = low.cmpeq(UVec3::ZERO);
-    let is_last = high.cmpge(plan.index.dims());
-    let owned = Aabb {
-        min: DVec3::select(is_first, DVec3::NEG_INFINITY, low.as_dvec3() * n_cells),
-        max: DVec3::select(is_last, DVec3::INFINITY, high.as_dvec3() * n_cells),
-    };
-    let b = owned.intersection(&plan.domain);
-    Aabb { min: b.min - plan.rays.center, max: b.max - plan.rays.center }
 }

@@ -46,6 +46,20 @@ impl FramePlan {
         (self.dims - 1).as_dvec3()
     }
 
+    /// The part of the domain that belongs to the block of an index cell, relative to the frame's centre.
+    pub fn block_box(&self, cell: UVec3) -> Aabb {
+        let n_cells = f64::from(self.bricks.side().n_cells());
+        let level = self.index.at(cell).level();
+        let low = cell >> u32::from(level.0) << u32::from(level.0);
+        let high = low + level.stride();
+        let owned = Aabb {
+            min: DVec3::select(low.cmpeq(UVec3::ZERO), DVec3::NEG_INFINITY, low.as_dvec3() * n_cells),
+            max: DVec3::select(high.cmpge(self.index.dims()), DVec3::INFINITY, high.as_dvec3() * n_cells),
+        };
+        let b = owned.intersection(&self.domain);
+        Aabb { min: b.min - self.rays.center, max: b.max - self.rays.center }
+    }
+
     /// How f32 arithmetic counts data values.
     pub fn value_scale(&self) -> ValueScale {
         ValueScale::of(&self.transfer, self.bricks.decode())

@@ -12,7 +12,6 @@ use super::scenes::{Exhibit, Geometry, exhibits, geometries, geometries_of, scen
 use super::seams::{camera as cube_camera, cube};
 use super::{LamarArgs, LamarError, print};
 use crate::compare::rivals::Rivals;
-use crate::report::heat;
 
 /// Behind transparent pixels.
 const BACKGROUND: [f64; 3] = [0.02, 0.02, 0.025];
@@ -20,6 +19,8 @@ const BACKGROUND: [f64; 3] = [0.02, 0.02, 0.025];
 const SIDE: BrickSide = BrickSide::S16;
 
 pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, LamarError> {
+    // For looking, larger than for timing.
+    let args = &LamarArgs { size: args.size * 2, ..args.clone() };
     // The last is a rasteriser, if there is one.
     let Some(backend) = rivals.present.last_mut() else { return Ok(Vec::new()) };
     figure_8(args, backend.as_mut())?;
@@ -29,7 +30,7 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, 
     Ok(Vec::new())
 }
 
-/// The constant cube, its bricks of several levels: each geometry without correction, with it, and the difference times 4.
+/// The constant cube, its bricks of several levels: each geometry without correction, with it, and the difference.
 fn figure_8(args: &LamarArgs, backend: &mut dyn Backend) -> Result<(), LamarError> {
     let (volume, fog) = cube();
     let tree = tree(&volume, SIDE, Downsampling::Subsample)?;
@@ -40,23 +41,26 @@ fn figure_8(args: &LamarArgs, backend: &mut dyn Backend) -> Result<(), LamarErro
         let of = |lengths| Scene { lengths, ..scene(args, &fog, cube_camera().expect("a camera"), geometry, &detail) };
         let nominal = render(&tree, &of(Lengths::Nominal), backend)?.0;
         let truth = render(&tree, &of(Lengths::True), backend)?.0;
-        rows[2].push(difference(&nominal, &truth, 4.0));
+        rows[2].push(difference(&nominal, &truth));
         rows[0].push(nominal);
         rows[1].push(truth);
     }
-    let what = "object planes, viewport planes, shells; uncorrected, corrected, 4 x the difference";
+    let what = "object planes, viewport planes, shells; uncorrected, corrected, the opacity that is missing (blue) or too much (red), full at 1/4";
     write(args, "figure8", &stacked(&rows.map(|row| beside(&row))), what)
 }
 
 /// From the surface and from inside: the bricks and the picture, with fixed tiles and with multiresolution.
 fn figure_14(args: &LamarArgs, backend: &mut dyn Backend, exhibit: &Exhibit) -> Result<(), LamarError> {
     let tree = tree(&exhibit.volume, SIDE, Downsampling::Subsample)?;
-    let overview: Viewpoint = "oblique zoom=0.7".parse().expect("a viewpoint");
+    // Beside the line of the views, so that cameras are seen from their sides.
+    let overview: Viewpoint = "from=-1,-0.4,0.5 zoom=0.8".parse().expect("a viewpoint");
     let overview = overview.camera(exhibit.volume.grid(), exhibit.frame, args.size)?;
     let mut rows = Vec::new();
     for (_, camera) in views(exhibit, args.size)?.into_iter().skip(1) {
         let mut panels = Vec::new();
-        for detail in [vec![Criterion::FullResolution], args.detail.clone()] {
+        // Distances of the paper's own factor.
+        for criterion in [Criterion::FullResolution, Criterion::Distance { factor: 1.0 }] {
+            let detail = [criterion];
             let scene = scene(args, &exhibit.transfer, camera, geometries(args)[3], &detail);
             let (picture, bricks) = render(&tree, &scene, backend)?;
             panels.extend([boxes(&tree, &overview, &camera, &bricks, args.size), picture]);
@@ -97,13 +101,14 @@ fn boxes(tree: &BrickTree, overview: &Camera, camera: &Camera, bricks: &[BrickId
     show_camera(&drawn, overview, camera, size, 0.12 * grid.world_box().diagonal())
 }
 
-/// Where and how much two pictures differ, as the report's heat.
-fn difference(a: &Image<f32>, b: &Image<f32>, gain: f64) -> Image<f32> {
+/// By how much the first picture is more opaque: white where equal, blue where it is less, red where it is more; full colour
+/// from a quarter on.
+fn difference(a: &Image<f32>, b: &Image<f32>) -> Image<f32> {
     let mut out = a.clone();
     for (to, from) in out.pixels_mut().iter_mut().zip(b.pixels()) {
-        let greatest = to.iter().zip(from).map(|(x, y)| f64::from((x - y).abs())).fold(0.0, f64::max);
-        let [r, g, b] = heat(gain * greatest).map(|c| (f32::from(c) / 255.0).powf(2.2));
-        *to = [r, g, b, 1.0];
+        let more = (4.0 * (to[3] - from[3])).clamp(-1.0, 1.0);
+        let rest = 1.0 - more.abs();
+        *to = if more < 0.0 { [rest, rest, 1.0, 1.0] } else { [1.0, rest, rest, 1.0] };
     }
     out
 }

@@ -1,10 +1,10 @@
 //! LaMar, Hamann and Joy 1999 on this project's data: table 1 with its errors, figures 8 and 14, and what else the paper claims.
 //!
-//! - [`selection`]: how many tiles the distance filter selects, figures 4 and 5.
-//! - [`table`]: fixed tiles against multiresolution, three proxy geometries and the ray caster, time and error on every backend.
-//! - [`downsampling`]: subsampling against averaging. [`memory`]: the formula for shared voxels against what is stored.
-//! - [`seams`]: a constant field, with and without opacity correction. [`shells`]: tessellated shells against spheres.
-//! - [`figures`]: pictures. [`views`]: a screen-space error of a pixel, over views of a large volume.
+//! - `selection`: how many tiles the distance filter selects, figures 4 and 5.
+//! - `table`: fixed tiles against multiresolution, three proxy geometries and the ray caster, time and error on every backend.
+//! - `downsampling`: subsampling against averaging. `memory`: the formula for shared voxels against what is stored.
+//! - `seams`: a constant field, with and without opacity correction. `shells`: tessellated shells against spheres.
+//! - `figures`: pictures. `views`: a screen-space error of a pixel, over views of a large volume.
 
 mod args;
 mod downsampling;

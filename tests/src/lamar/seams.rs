@@ -32,7 +32,7 @@ pub(super) fn cube() -> (Volume, TransferFunction) {
 pub(super) fn camera() -> Result<Camera, LamarError> {
     let center = DVec3::splat(0.5 * f64::from(SIDE));
     let eye = center + DVec3::new(0.75, -1.0, 0.6) * f64::from(SIDE);
-    Ok(Camera::look_at(eye, center, DVec3::Z, Projection::Perspective { fov_y: 60f64.to_radians() })?)
+    Ok(Camera::look_at(eye, center, DVec3::Z, Projection::Perspective { fov_y: 80f64.to_radians() })?)
 }
 
 pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, LamarError> {

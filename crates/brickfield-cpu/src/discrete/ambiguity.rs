@@ -21,7 +21,7 @@ use brickfield_optics::{Segment, alpha, transmittance};
 use super::field::{Field, Stored};
 use super::walk::{Part, clip, middle, parts, segments, whole};
 use super::{part_values, relative, segment};
-use crate::blocks::{Blocks, block_box};
+use crate::blocks::Blocks;
 
 /// How far the cosines of a ray's angles to planes may be off: a few roundings of numbers below 1.
 pub(super) const TIE: f64 = 1e-6;
@@ -123,7 +123,7 @@ impl Ambiguity {
         match plan.sampling.division() {
             Division::Ray => of(span, relative(&plan.domain, plan.rays.center), Level(0), None),
             Division::Brick => Blocks::new(plan, ray, span)
-                .map(|c| of(c.span, block_box(plan, &c), c.entry.level(), Some(c.cell)))
+                .map(|c| of(c.span, plan.block_box(c.cell), c.entry.level(), Some(c.cell)))
                 .sum(),
         }
     }

@@ -10,7 +10,7 @@ use brickfield_core::glam::{DVec2, UVec3};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-use crate::{FramePlan, IndexEntry, Lengths};
+use crate::{Division, FramePlan, IndexEntry, Lengths, Placement};
 use picture::Projector;
 use polygon::{area, grown};
 use surfaces::{Outline, outlines};
@@ -105,8 +105,12 @@ const BATCH_FRAGMENTS: f64 = (1u32 << 24) as f64;
 impl ProxyGeometry {
     /// The polygons of a plan whose resident bricks hold the index cells `back_to_front`, one cell for each brick.
     ///
+    /// Spheres have no polygons, nor have segments that do not end with their brick ([`Division::Ray`]): then there are none.
+    ///
     /// Cost: about 1 us a polygon, over all threads of the current rayon pool.
     pub fn of(plan: &FramePlan, back_to_front: &[UVec3], target: Target) -> ProxyGeometry {
+        let is_drawn = plan.sampling.placement() != Placement::Shells && plan.sampling.division() == Division::Brick;
+        let back_to_front = if is_drawn { back_to_front } else { &[] };
         let projector = Projector::new(&plan.rays, plan.sampling.step_world());
         let of_brick = |cell: &UVec3| outlines(plan, &projector, *cell);
         let outlines: Vec<Vec<Outline>> = back_to_front.par_iter().map(of_brick).collect();

@@ -40,7 +40,7 @@ const PYRAMID_MARGIN: f64 = 1.002;
 
 /// The polygons of the brick that holds an index cell, from back to front along every ray.
 pub(super) fn outlines(plan: &FramePlan, projector: &Projector<'_>, cell: UVec3) -> Vec<Outline> {
-    let (b, entry) = (brick_box(plan, cell), plan.index.at(cell));
+    let (b, entry) = (plan.block_box(cell), plan.index.at(cell));
     if b.is_empty() || !matches!(entry, IndexEntry::Resident { .. }) {
         return Vec::new();
     }
@@ -54,20 +54,6 @@ pub(super) fn outlines(plan: &FramePlan, projector: &Projector<'_>, cell: UVec3)
     }
     outlines.retain(|o| !o.points.is_empty());
     outlines
-}
-
-/// The part of the domain that a brick owns, relative to the frame's centre.
-fn brick_box(plan: &FramePlan, cell: UVec3) -> Aabb {
-    let n_cells = f64::from(plan.bricks.side().n_cells());
-    let level = u32::from(plan.index.at(cell).level().0);
-    let low = cell >> level << level;
-    let high = low + (1 << level);
-    let owned = Aabb {
-        min: DVec3::select(low.cmpeq(UVec3::ZERO), plan.domain.min, low.as_dvec3() * n_cells),
-        max: DVec3::select(high.cmpge(plan.index.dims()), plan.domain.max, high.as_dvec3() * n_cells),
-    };
-    let b = owned.intersection(&plan.domain);
-    Aabb { min: b.min - plan.rays.center, max: b.max - plan.rays.center }
 }
 
 /// The faces through which rays leave a box.
@@ -88,8 +74,8 @@ fn exits(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Outline> 
 /// The stacks of planes that rays through a box may meet.
 fn stacks(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Stack> {
     match plan.sampling.placement() {
-        // Spheres are drawn as if each ray had a facet of its own only by ray casters.
-        Placement::Shells | Placement::ViewportPlanes => vec![picture_plane(plan, projector, DVec3::Z, 0, Part::All)],
+        Placement::Shells => Vec::new(),
+        Placement::ViewportPlanes => vec![picture_plane(plan, projector, DVec3::Z, 0, Part::All)],
         Placement::TessellatedShells { .. } => facets_over(plan, projector, b),
         Placement::ObjectPlanes => object_stacks(plan, projector),
     }
