@@ -65,7 +65,8 @@ fn steps() -> Result<Vec<Step>> {
     steps.push(step("orders of accuracy", || xtask(&["orders"]).run()));
     steps.push(step("conformance", || xtask(&["conformance", "--require", "cpu,wgpu,ash"]).run()));
     steps.push(step("conformance of the cases", || xtask(&["conformance", "--self-check"]).run()));
-    let claims = ["compare", "--paper", "lamar", "--part", "selection,seams,shells", "--check", "--require", "wgpu,ash"];
+    let claims =
+        ["compare", "--paper", "lamar", "--part", "selection,seams,shells", "--check", "--require", "wgpu,ash"];
     steps.push(step("claims of LaMar, Hamann and Joy 1999", move || xtask(&claims).run()));
     Ok(steps)
 }

@@ -38,6 +38,10 @@ pub enum PrepareError {
     RoundPolygons,
     #[error("polygons of whole rays: they are clipped to bricks; divide bricks")]
     PolygonsOfRays,
+    #[error(
+        "about {n_polygons:.1e} polygons; at most {limit} are possible: take a larger step, larger bricks or a coarser level"
+    )]
+    TooManyPolygons { n_polygons: f64, limit: u32 },
     #[error(transparent)]
     Sampling(#[from] SamplingError),
 }
@@ -48,6 +52,8 @@ pub const MAX_IMAGE: u32 = 32_768;
 const MOST_VALUE: f64 = 1e300;
 /// Least width of the range of data values that are not all equal.
 const LEAST_WIDTH: f64 = 1e-300;
+/// Most polygons of a frame, about: a gigabyte of corners.
+pub const MAX_POLYGONS: u32 = 1 << 22;
 /// Most segments on a ray: an f32 counts them exactly.
 pub const MAX_SEGMENTS: u32 = 1 << 24;
 
@@ -84,7 +90,10 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
     let levels_differ = resident.iter().any(|id| id.level != Level(0));
     let ordered = match scene.technique {
         Technique::RayCasting => Vec::new(),
-        Technique::Polygons(_) => from_back_to_front(tree, scene, &resident),
+        Technique::Polygons(_) => {
+            check_polygons(tree, step_world, resident.len())?;
+            from_back_to_front(tree, scene, &resident)
+        }
     };
     let bricks = residency.hold(tree, resident);
     let (occupancy, overview) = match scene.skipping {
@@ -132,6 +141,17 @@ fn check_technique(scene: &Scene) -> Result<(), PrepareError> {
         (_, _, Division::Ray) => Err(PrepareError::PolygonsOfRays),
         (_, _, Division::Brick) => Ok(()),
     }
+}
+
+/// A brick's diagonal is as many steps long at every level.
+fn check_polygons(tree: &BrickTree, step_world: f64, n_bricks: usize) -> Result<(), PrepareError> {
+    let voxel = tree.grid().world_box().extent() / tree.grid().dims().as_dvec3();
+    let surfaces = voxel.length() * f64::from(tree.layout().side().n_cells()) / step_world;
+    let n_polygons = n_bricks as f64 * surfaces;
+    if n_polygons <= f64::from(MAX_POLYGONS) {
+        return Ok(());
+    }
+    Err(PrepareError::TooManyPolygons { n_polygons, limit: MAX_POLYGONS })
 }
 
 fn check_size(size: UVec2) -> Result<(), PrepareError> {
@@ -298,5 +318,24 @@ mod tests {
         };
         assert!(plan(1e6).is_ok());
         assert!(matches!(plan(1e30), Err(PrepareError::TooManySegments { .. })), "{:?}", plan(1e30).err());
+    }
+
+    #[test]
+    fn polygons_that_no_memory_holds_and_those_of_spheres_and_rays_are_refused() {
+        let grid = Grid::axis_aligned(UVec3::splat(64), DVec3::ONE).unwrap();
+        let tree = build_tree(&Volume::new(grid, vec![1u8; 64 * 64 * 64]).unwrap(), &BuildOptions::default()).unwrap();
+        let camera = Camera::framing(&grid.world_box(), DVec3::X, DVec3::Z).unwrap();
+        let fog = TransferFunction::constant(0.1, [1.0; 3]).unwrap();
+        let plan = |step_voxels, placement, division| {
+            let technique = Technique::Polygons(brickfield_frame::Target::Float32);
+            let scene = Scene::new(camera, UVec2::new(4, 4), fog.clone());
+            let scene = Scene { step_voxels, placement, division, technique, ..scene };
+            prepare(&tree, &scene, &mut Residency::default()).map(|plan| plan.proxy.is_some())
+        };
+        assert_eq!(plan(1.0, Placement::ObjectPlanes, Division::Brick), Ok(true));
+        assert_eq!(plan(1.0, Placement::Shells, Division::Brick), Err(PrepareError::RoundPolygons));
+        assert_eq!(plan(1.0, Placement::ObjectPlanes, Division::Ray), Err(PrepareError::PolygonsOfRays));
+        let many = plan(1e-5, Placement::ObjectPlanes, Division::Brick);
+        assert!(matches!(many, Err(PrepareError::TooManyPolygons { .. })), "{many:?}");
     }
 }

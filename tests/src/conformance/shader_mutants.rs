@@ -127,15 +127,11 @@ mutants! {
     /// Rays end at a transmittance of 1/5.
     ENDS_EARLY: "ends-early", "march", "exp(-seen.w) < frame.direction_down.w" => "exp(-seen.w) < 0.2";
     /// Bricks have the steps of level 0, whatever their level.
-    STEPS_OF_LEVEL_0: "steps-of-level-0", "segments", "own.step *= coarseness;" => "";
+    STEPS_OF_LEVEL_0: "steps-of-level-0", "segments", "own.apart *= f32(stride_of(block));" => "";
     /// A brick's segments go on to the end of the ray.
     BRICK_NOT_LEFT: "brick-not-left", "march", "span.end = min(exit, visible.end);" => "span.end = visible.end;";
     /// Nominal lengths have the angle's stretch.
-    NOMINAL_STRETCHED: "nominal-stretched", "segments",
-        "fn nominal_length(ray: Ray) -> f32 {\n    return frame.direction_right.w;" => "fn nominal_length(ray: Ray) -> f32 {\n    return ray.step;";
-    /// The same, in bricks with segments of their own.
-    NOMINAL_STRETCHED_IN_BRICKS: "nominal-stretched-in-bricks", "segments",
-        "return frame.direction_right.w * ray.coarseness;" => "return ray.step;";
+    NOMINAL_STRETCHED: "nominal-stretched", "segments", "piece.weight = ray.apart;" => "piece.weight = step_of(ray);";
     /// The segments of polygons begin at the surface before, even outside of the brick.
     POLYGON_NOT_CUT: "polygon-not-cut", "proxy", "let start = max(span.start, near);" => "let start = near;";
     /// The last segment of a brick begins a surface too early.
@@ -144,8 +140,8 @@ mutants! {
     /// Polygons show the brick that is drawn before theirs.
     FOREIGN_BRICK: "foreign-brick", "proxy", "drawn[polygon.brick]" => "drawn[max(polygon.brick, 1u) - 1u]";
     /// Planes parallel to the picture are as far apart on every ray.
-    PLANES_NOT_STRETCHED: "planes-not-stretched", "rays", "ray.step = frame.direction_right.w * length;"
-        => "ray.step = frame.direction_right.w;";
+    PLANES_NOT_STRETCHED: "planes-not-stretched", "rays", "ray.stretch = length;"
+        => "ray.stretch = 1.0;";
     /// Facets are those of the neighbouring square.
     FACET_BESIDE: "facet-beside", "rays", "return 2u * (square.x + square.y" => "return 2u * (square.x + 1u + square.y";
     /// Rays take the least steep stack of planes.

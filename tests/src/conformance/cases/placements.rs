@@ -132,12 +132,13 @@ fn nominal() -> Vec<Case> {
 
 fn extremes() -> Vec<Case> {
     let fog = || TransferFunction::constant(0.04, WARM).expect("a transfer function");
-    let long = |(placement, _): (Placement, _)| {
-        let name = format!("placement/long-rays-{}", placement.name());
+    let long = |(placement, division): (Placement, Division)| {
+        let what = if division == Division::Ray { "rays" } else { "rays-in-bricks" };
+        let name = format!("placement/long-{what}-{}", placement.name());
         picture(name, catches![shader::PASS_FORGETS, ExtinctionScaled], move || {
             placed(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), placement).step(0.003).with(|s| {
                 s.size = UVec3::new(12, 10, 0).truncate();
-                s.division = Division::Brick;
+                s.division = division;
             })
         })
     };
@@ -162,5 +163,7 @@ fn extremes() -> Vec<Case> {
         })
     };
     let all = || PLACEMENTS.into_iter();
-    all().map(long).chain(all().map(far)).chain(all().map(constant)).collect()
+    let both = [Division::Ray, Division::Brick].into_iter();
+    let long = both.flat_map(|division| PLACEMENTS.map(|(placement, _)| (placement, division))).map(long);
+    long.chain(all().map(far)).chain(all().map(constant)).collect()
 }

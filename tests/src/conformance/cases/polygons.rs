@@ -18,7 +18,7 @@ const FACETS: Placement = Placement::TessellatedShells { facet_pixels: 12 };
 const PLACEMENTS: [Placement; 3] = [FACETS, Placement::ViewportPlanes, Placement::ObjectPlanes];
 
 pub(super) fn cases() -> Vec<Case> {
-    [plain(), levels(), rules(), views(), nominal(), targets()].into_iter().flatten().collect()
+    [plain(), levels(), rules(), views(), nominal(), targets(), stiff()].into_iter().flatten().collect()
 }
 
 fn large() -> Volume {
@@ -105,9 +105,21 @@ fn views() -> Vec<Case> {
 }
 
 fn nominal() -> Vec<Case> {
-    each("nominal", catches![PolygonsReversed, PolygonsMissing, shader::NOMINAL_STRETCHED_IN_BRICKS], |p| {
+    each("nominal", catches![PolygonsReversed, PolygonsMissing, shader::NOMINAL_STRETCHED], |p| {
         polygons(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), p).with(|s| s.lengths = Lengths::Nominal)
     })
+}
+
+/// Optical depths of a step from next to nothing to beyond all f32.
+fn stiff() -> Vec<Case> {
+    let case = |extinction: f64| {
+        let mutants = if extinction < 1.0 { catches![ExtinctionScaled] } else { catches![RedBlueSwapped] };
+        picture(format!("polygons/extinction-{extinction:e}"), mutants, move || {
+            let transfer = TransferFunction::constant(extinction, WARM).expect("a transfer function");
+            polygons(hills(&grid(), ScalarType::U8), transfer, Placement::ObjectPlanes)
+        })
+    };
+    [1e-3, 1e3, 1e9].into_iter().map(case).collect()
 }
 
 fn targets() -> Vec<Case> {
