@@ -39,6 +39,10 @@ impl Polygons {
     ) -> Result<(), RenderError> {
         if !self.held.is(proxy) {
             self.held = Held::nothing();
+            let n_corners = proxy.corners().len();
+            if proxy.indices().iter().any(|i| *i as usize >= n_corners) {
+                return Err(RenderError::Unsupported { what: "draw triangles without corners" });
+            }
             let (corners, indices) = (bytemuck::cast_slice(proxy.corners()), bytemuck::cast_slice(proxy.indices()));
             let to_corners = self.corners.reserve(device, corners.len())?;
             let to_indices = self.indices.reserve(device, indices.len())?;

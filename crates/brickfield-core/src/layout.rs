@@ -113,7 +113,7 @@ impl BrickLayout {
     /// Bricks of a level along x, y, z.
     #[inline]
     pub fn n_bricks(&self, level: Level) -> UVec3 {
-        ((self.n_bricks - 1) >> u32::from(level.0)) + 1
+        ((self.n_bricks - 1) >> u32::from(level.0).min(31)) + 1
     }
 
     /// Number of bricks of a level.

@@ -321,3 +321,17 @@ fn a_ray_along_a_face_between_levels_is_ambiguous_and_others_are_not() {
     assert!(jump > 0.5 && face.ambiguity[0] >= jump, "{jump} {}", face.ambiguity[0]);
     assert_eq!((left.ambiguity[0], right.ambiguity[0]), (0.0, 0.0));
 }
+
+/// Rays in the plane of a face, where rounding puts nodes into blocks that the ray has left: no segment is lost.
+#[test]
+fn rays_along_a_face_between_bricks_see_every_segment() {
+    let volume = support::volume([46, 46, 46], DVec3::ONE, ScalarType::U8, bumps);
+    let eye = DVec3::new(20.5, 23.0, 30.5);
+    let projection = Projection::Perspective { fov_y: 60f64.to_radians() };
+    let up = DVec3::new(0.1, 0.2, 1.0);
+    let camera = Camera::look_at(eye, eye + DVec3::X * 10.0, up, projection).unwrap();
+    let thin = TransferFunction::constant(0.05, [1.0; 3]).unwrap();
+    for transfer in [thin, ramp()] {
+        check(&Setup { camera, size: UVec2::new(33, 17), ..Setup::new(&volume, transfer) });
+    }
+}

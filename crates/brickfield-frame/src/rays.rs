@@ -145,14 +145,17 @@ impl RayFrame {
         // The surface before the nearest point: no surface is farther from the eye than spheres are.
         let coarsest = steps.coarsest_world();
         let start = ((nearest / coarsest).floor() * coarsest).max(0.0);
-        let n_segments = (farthest(camera, &corners) - start) / steps.step_world;
+        let farthest = farthest(camera, &corners);
+        let n_segments = (farthest - start) / steps.step_world;
         let frame =
             RayFrame { start, anchor_past_start: depth - start, n_segments: n_segments.ceil().max(1.0), ..frame };
         match steps.placement {
             Placement::Shells | Placement::ViewportPlanes => frame,
             Placement::TessellatedShells { .. } => {
-                let centre = frame.facet_normal(frame.facet_of(size.x / 2, size.y / 2)).length();
-                RayFrame { n_segments: (n_segments * centre).ceil().max(1.0), ..frame }
+                // The facet in the middle lies deepest in its sphere: its surfaces are the closest.
+                let closest = frame.facet_normal(frame.facet_of(size.x / 2, size.y / 2)).length();
+                let n_segments = (farthest * closest - start) / steps.step_world;
+                RayFrame { n_segments: n_segments.ceil().max(1.0), ..frame }
             }
             Placement::ObjectPlanes => {
                 let planes = PlaneStacks::new(grid, center, domain, steps);

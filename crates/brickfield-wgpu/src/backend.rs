@@ -83,6 +83,11 @@ impl WgpuBackend {
         if filtered_floats && !self.device.has(Features::FLOAT32_FILTERABLE) {
             return Err(RenderError::Unsupported { what: "filter 32-bit floats in hardware (FLOAT32_FILTERABLE)" });
         }
+        Ok(())
+    }
+
+    /// Whether the device blends what a plan's polygons are drawn into.
+    fn check_blending(&self, plan: &FramePlan) -> Result<(), RenderError> {
         let blends_floats = plan.proxy.as_ref().is_some_and(|proxy| proxy.target() == Target::Float32);
         if blends_floats && !self.device.has(Features::FLOAT32_BLENDABLE) {
             return Err(RenderError::Unsupported { what: "blend 32-bit floats (FLOAT32_BLENDABLE): take rgba16float" });
@@ -136,6 +141,7 @@ impl Backend for WgpuBackend {
             return Ok(Frame { image: Image::transparent(size), timing: Timing::default() });
         }
         self.check_features(plan)?;
+        self.check_blending(plan)?;
         let started = Instant::now();
         let maker = plan.proxy.as_ref().map_or(Maker::Rays, |proxy| Maker::Polygons(proxy.target()));
         let pipeline = match maker {

@@ -91,7 +91,7 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
     let ordered = match scene.technique {
         Technique::RayCasting => Vec::new(),
         Technique::Polygons(_) => {
-            check_polygons(tree, step_world, resident.len())?;
+            check_polygons(tree, &rays, step_world, resident.len())?;
             from_back_to_front(tree, scene, &resident)
         }
     };
@@ -144,10 +144,15 @@ fn check_technique(scene: &Scene) -> Result<(), PrepareError> {
 }
 
 /// A brick's diagonal is as many steps long at every level.
-fn check_polygons(tree: &BrickTree, step_world: f64, n_bricks: usize) -> Result<(), PrepareError> {
+fn check_polygons(tree: &BrickTree, rays: &RayFrame, step_world: f64, n_bricks: usize) -> Result<(), PrepareError> {
+    const FACES: f64 = 6.0;
     let voxel = tree.grid().world_box().extent() / tree.grid().dims().as_dvec3();
     let surfaces = voxel.length() * f64::from(tree.layout().side().n_cells()) / step_world;
-    let n_polygons = n_bricks as f64 * surfaces;
+    let of_facets = match rays.placement {
+        Placement::TessellatedShells { .. } => f64::from(rays.n_facets()) * rays.n_segments,
+        _ => 0.0,
+    };
+    let n_polygons = n_bricks as f64 * (surfaces + FACES) + of_facets;
     if n_polygons <= f64::from(MAX_POLYGONS) {
         return Ok(());
     }

@@ -2,17 +2,18 @@
 //!
 //! **Exact mode**, against the discrete f64 answer, all four channels: |difference| <= 1e-4 up to 2,048 samples a ray and
 //! 2.5e-4 above, for no sum is longer than 8,192 segments and the sums of passes are few; 99.9 % of the pixels within 1e-5.
-//! Both are wider by the reference's `ambiguity` of the pixel, and by nothing else.
+//! Both are wider by the reference's `ambiguity` of the pixel; the narrow one also by what one rounding of each term of a
+//! position may change (`position_rounding`), which is more than 1e-5 where the transfer function is steep and opaque.
 //!
 //! **Fast mode** adds, per pixel, what hardware filtering may do (`filter`) and, where a ray may end early, the
 //! transmittance floor: that is the most that any channel can lose behind the point where it ends.
 //! **Polygons** are blended: of each segment that a ray sees, three roundings remain, of 1 - alpha, of its product with what lies
-//! behind and of the sum, each of at most the target's unit roundoff (2^-24, or 2^-11 for 16-bit floats, which round once).
-//! What is blended is at most 1, and what comes before only dims it: so both bounds are wider by three (one) of them a segment.
+//! behind and of the sum, each of at most the target's unit roundoff: 2^-24, or 2^-11 for 16-bit floats, in which a device may blend.
+//! What is blended is at most 1, and what comes before only dims it: so both bounds are wider by three of them a segment.
 //!
 //! A tolerance so wide that the picture could be anything is no test: see [`Tolerance::is_empty_promise`].
 
-use brickfield::cpu::Discrete;
+use brickfield::cpu::{Discrete, position_rounding};
 use brickfield::frame::{Capabilities, Division, FramePlan, Lengths, Mode, Target};
 use brickfield_core::glam::UVec2;
 use brickfield_core::{Image, TransferFunction};
@@ -83,11 +84,12 @@ impl Tolerance {
     /// Rays that are too long for any rule.
     pub fn of(plan: &FramePlan, reference: &Discrete, device: &Capabilities) -> Result<Tolerance, Complaint> {
         let most = most_difference(plan)?;
-        let blended = blending(plan, reference);
+        let (blended, rounding) = (blending(plan, reference), position_rounding(plan));
         let exact =
             |bound: f64| reference.ambiguity.iter().zip(&blended).map(|(a, b)| bound + a + b).collect::<Vec<f64>>();
+        let narrow = |bulk: Vec<f64>| bulk.iter().zip(&rounding).map(|(b, r)| b + r).collect::<Vec<f64>>();
         let Mode::Fast { transmittance_floor } = plan.sampling.mode() else {
-            return Ok(Tolerance { most: exact(most), bulk: exact(BULK_BOUND) });
+            return Ok(Tolerance { most: exact(most), bulk: narrow(exact(BULK_BOUND)) });
         };
         if plan.sampling.division() == Division::Brick || plan.sampling.lengths() == Lengths::Nominal {
             return Err(Complaint::NoFastRule);
@@ -98,7 +100,7 @@ impl Tolerance {
             if transmittance <= transmittance_floor + filter[i] + most { transmittance_floor } else { 0.0 }
         };
         let fast = |exact: Vec<f64>| exact.iter().enumerate().map(|(i, e)| e + filter[i] + ends(i)).collect();
-        Ok(Tolerance { most: fast(exact(most)), bulk: fast(exact(BULK_BOUND)) })
+        Ok(Tolerance { most: fast(exact(most)), bulk: fast(narrow(exact(BULK_BOUND))) })
     }
 
     /// The bound that a quarter of the pixels exceeds, if it is so wide that hardly anything could fail.
@@ -185,7 +187,7 @@ fn blending(plan: &FramePlan, reference: &Discrete) -> Vec<f64> {
     let rounding = match plan.proxy.as_ref().map(|proxy| proxy.target()) {
         None => 0.0,
         Some(Target::Float32) => 3.0 * (-24f64).exp2(),
-        Some(Target::Float16) => (-11f64).exp2(),
+        Some(Target::Float16) => 3.0 * (-11f64).exp2(),
     };
     reference.visible_segments.iter().map(|n| rounding * f64::from(*n)).collect()
 }

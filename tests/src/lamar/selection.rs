@@ -15,10 +15,16 @@ pub(super) fn run(_: &LamarArgs) -> Result<Vec<String>, LamarError> {
         "Figure 4: eight tiles in four levels; a tile is drawn if the point is farther from its centre than its width.\n\
            Tiles of each level, finest first, by the place of the point in tiles:\n",
     )?;
-    for tenths in [2, 12, 22, 32, 38, 48, 58, 68, 78] {
-        let point = f64::from(tenths) / 10.0 + 0.03;
-        let n = select(UVec3::new(8, 0, 0), DVec3::X * point)?.n_drawn_per_level();
-        print(&format!("  {point:.2}: {n:?}, {} in all", n.iter().sum::<usize>()))?;
+    let mut missed = Vec::new();
+    // Worked out by hand; a mirrored point sees the mirrored cut.
+    for (point, by_hand) in [(0.25, [2, 1, 1, 0]), (1.5, [4, 0, 1, 0]), (2.5, [4, 2, 0, 0]), (3.5, [4, 2, 0, 0])] {
+        for point in [point, 8.0 - point] {
+            let n = select(UVec3::new(8, 0, 0), DVec3::X * point)?.n_drawn_per_level();
+            print(&format!("  {point:.2}: {n:?}, {} in all", n.iter().sum::<usize>()))?;
+            if n != by_hand {
+                missed.push(format!("figure 4: {n:?} tiles at {point}, by hand {by_hand:?}"));
+            }
+        }
     }
     // Eighths of a tile are exact, so that ties are ties.
     let eighths = || (0..=128).map(|i| f64::from(i) / 8.0);
@@ -33,12 +39,10 @@ pub(super) fn run(_: &LamarArgs) -> Result<Vec<String>, LamarError> {
          Points by their number of tiles: {}",
         words.join(", ")
     ))?;
-    let holds = (least, most) == (13, 61) && counts.contains_key(&49);
-    Ok(if holds {
-        Vec::new()
-    } else {
-        vec![format!("figure 5: {least} to {most} tiles, 49 among them: {}", counts.contains_key(&49))]
-    })
+    if (least, most) != (13, 61) || !counts.contains_key(&49) {
+        missed.push(format!("figure 5: {least} to {most} tiles, 49 among them: {}", counts.contains_key(&49)));
+    }
+    Ok(missed)
 }
 
 /// The tiles for a point of interest, in tiles from the first sample.

@@ -54,5 +54,8 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, 
             missed.push(format!("{name}: shells converge with order {order:.2}, not 2"));
         }
     }
+    if rivals.present.iter().all(|b| b.describe().backend == "cpu") {
+        missed.push("shells: no backend with a rasteriser".to_owned());
+    }
     Ok(missed)
 }

@@ -149,7 +149,7 @@ impl<'q, 'a> Recorder<'q, 'a> {
             .framebuffer(canvas.framebuffer)
             .render_area(area);
         // SAFETY: canvas, pipeline, its set, what is bound, and both buffers outlive the run. The pipeline was made for a pass
-        // like the canvas's; indices are inside their buffer (asserted), and name corners that were uploaded with them.
+        // like the canvas's; indices are inside their buffer (asserted), and name corners that are there (`Polygons::hold` looks).
         unsafe {
             self.device.cmd_begin_render_pass(self.commands, &pass, vk::SubpassContents::INLINE);
             self.device.cmd_bind_pipeline(self.commands, graphics, pipeline.raw);

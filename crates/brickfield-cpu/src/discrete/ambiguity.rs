@@ -169,7 +169,7 @@ impl Ambiguity {
 }
 
 /// How far a position of the ray may be off along each axis, in voxels, for parameters up to `far`.
-fn distance(plan: &FramePlan, ray: &PlanRay, far: f64) -> DVec3 {
+pub(super) fn distance(plan: &FramePlan, ray: &PlanRay, far: f64) -> DVec3 {
     (plan.rays.center.abs() + ray.anchor.abs() + ray.direction.abs() * (far + ray.t_anchor.abs())) * ROUNDING
 }
 
@@ -229,7 +229,7 @@ fn spread(plan: &FramePlan, nodes: &[Values], part: Part) -> (f64, f64) {
     (change, least)
 }
 
-fn difference(a: &Segment, b: &Segment) -> f64 {
+pub(super) fn difference(a: &Segment, b: &Segment) -> f64 {
     let emission = a.emission.iter().zip(b.emission).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
     emission + (transmittance(a.depth) - transmittance(b.depth)).abs()
 }

@@ -128,9 +128,11 @@ fn brick_by_brick<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRay,
         let block = scene.block_of(crossing.cell);
         let resident = Resident { block: &block, slot, level };
         state.push(single_in(scene, &path, &block, path.first));
-        let n = path.end - 1 - (path.first + 1);
-        if n > 0 {
-            resident.run(scene, &path, path.first + 1, nodes, n.min(MOST) as i32, state);
+        let mut k = path.first + 1;
+        while k < path.end - 1 {
+            let n = (path.end - 1 - k).min(MOST);
+            resident.run(scene, &path, k, nodes, n as i32, state);
+            k += n;
         }
         if path.end - 1 > path.first {
             state.push(single_in(scene, &path, &block, path.end - 1));
@@ -181,7 +183,8 @@ fn run<const N: usize, S: Stored>(
     if let (IndexEntry::Resident { slot, level }, true) = (block.entry, n > 0) {
         Resident { block: &block, slot, level }.run(scene, path, k, (near, far), n, state);
     }
-    i64::from(n)
+    // Rounding may have put the node into a block that the ray has left already.
+    i64::from(n.max(0))
 }
 
 /// A block that is a brick.

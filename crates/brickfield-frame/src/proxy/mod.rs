@@ -40,7 +40,7 @@ pub enum Target {
     /// Four floats of 32 bits.
     #[default]
     Float32,
-    /// Four floats of 16 bits: half the memory and less precision, about 2^-12 a fragment.
+    /// Four floats of 16 bits: half the memory; what is blended is rounded to 11 bits at every fragment.
     Float16,
 }
 

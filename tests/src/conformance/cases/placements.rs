@@ -136,8 +136,8 @@ fn extremes() -> Vec<Case> {
         let what = if division == Division::Ray { "rays" } else { "rays-in-bricks" };
         let name = format!("placement/long-{what}-{}", placement.name());
         picture(name, catches![shader::PASS_FORGETS, ExtinctionScaled], move || {
-            placed(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), placement).step(0.003).with(|s| {
-                s.size = UVec3::new(12, 10, 0).truncate();
+            placed(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), placement).step(0.0006).with(|s| {
+                s.size = UVec3::new(4, 3, 0).truncate();
                 s.division = division;
             })
         })
