@@ -1,6 +1,6 @@
 //! How a frame is cut into dispatches: none takes long, no loop goes round too often, no sum grows too long.
 
-use brickfield_frame::{FramePlan, Pass, QuadratureRule};
+use brickfield_frame::{Division, FramePlan, Pass, QuadratureRule};
 
 use crate::KnotSearch;
 
@@ -43,7 +43,17 @@ fn segment_ranges(plan: &FramePlan) -> Vec<std::ops::Range<f32>> {
 }
 
 fn segments_per_pass(plan: &FramePlan) -> f64 {
-    (MOST_ROUNDS / rounds_per_segment(plan)).min(MOST_SEGMENTS).floor().max(1.0)
+    let rounds = MOST_ROUNDS - rounds_of_bricks(plan);
+    (rounds / rounds_per_segment(plan)).min(MOST_SEGMENTS).floor().max(1.0)
+}
+
+/// How often the loops go round for the bricks that a ray crosses, in every pass: once for each, for what earlier passes saw of
+/// it, and for the two segments that its faces cut.
+fn rounds_of_bricks(plan: &FramePlan) -> f64 {
+    match plan.sampling.division() {
+        Division::Ray => 0.0,
+        Division::Brick => f64::from(plan.index.dims().element_sum()) * (3.0 + 2.0 * rounds_per_segment(plan)),
+    }
 }
 
 /// How often the loops of the march go round for a segment, at most: once each to find its block, to enter it and to
