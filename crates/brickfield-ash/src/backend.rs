@@ -102,9 +102,7 @@ impl AshBackend {
             timing: Timing { upload_ms, device_ms: time.device_ms, wall_ms: time.wall_ms, read_back_ms },
         })
     }
-}
 
-impl AshBackend {
     /// As [`replay`](Self::replay), by rasterising polygons.
     fn rasterise(&mut self, plan: &FramePlan, proxy: &Arc<ProxyGeometry>) -> Result<Frame, RenderError> {
         let (started, target) = (Instant::now(), proxy.target());

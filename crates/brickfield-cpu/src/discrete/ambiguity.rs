@@ -38,7 +38,7 @@ pub(super) struct Ambiguity {
 }
 
 /// The values that a node may have; the first is the one it has in f64.
-type Values = Vec<Option<f64>>;
+pub(super) type Values = Vec<Option<f64>>;
 
 impl Ambiguity {
     pub(super) fn new<S: Stored>(field: &Field<S>) -> Ambiguity {
@@ -212,7 +212,7 @@ fn cells(low: UVec3, high: UVec3) -> impl Iterator<Item = UVec3> {
 }
 
 /// How far a segment's contribution may stray, and the least depth it may have.
-fn spread(plan: &FramePlan, nodes: &[Values], part: Part) -> (f64, f64) {
+pub(super) fn spread(plan: &FramePlan, nodes: &[Values], part: Part) -> (f64, f64) {
     let second: &[Option<f64>] = nodes.get(1).map_or(&[None], |v| v);
     let own = segment(plan, [nodes[0][0], second[0]], part.length);
     let (mut change, mut least) = (0.0f64, own.depth);
@@ -229,7 +229,7 @@ fn spread(plan: &FramePlan, nodes: &[Values], part: Part) -> (f64, f64) {
     (change, least)
 }
 
-pub(super) fn difference(a: &Segment, b: &Segment) -> f64 {
+fn difference(a: &Segment, b: &Segment) -> f64 {
     let emission = a.emission.iter().zip(b.emission).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
     emission + (transmittance(a.depth) - transmittance(b.depth)).abs()
 }

@@ -8,14 +8,14 @@
 
 use brickfield_core::TransferFunction;
 use brickfield_core::glam::{DVec3, UVec2};
-use brickfield_frame::{FramePlan, IndexEntry, PlanRay, SampleFormat};
+use brickfield_frame::{FramePlan, PlanRay, SampleFormat};
 use brickfield_optics::transmittance;
 use rayon::prelude::*;
 
-use super::ambiguity::{difference, distance};
+use super::ambiguity::{Values, distance, spread};
 use super::field::{Field, Float32, Stored, Unorm8, Unorm16};
+use super::relative;
 use super::walk::{Part, clip, parts};
-use super::{relative, segment};
 
 /// Roundings that `distance` reckons with at worst; here one of them.
 const AT_WORST: f64 = 8.0;
@@ -34,9 +34,6 @@ pub fn position_rounding(plan: &FramePlan) -> Vec<f64> {
     }
 }
 
-/// A node's value, and how far it may be off; `None` where its block is transparent.
-type Node = Option<(f64, f64)>;
-
 fn of_picture<S: Stored>(plan: &FramePlan) -> Vec<f64> {
     let (field, size): (Field<S>, UVec2) = (Field::new(plan), plan.size());
     let pixel = |i: u32| of_ray(&field, &plan.rays.ray(i % size.x, i / size.x));
@@ -49,8 +46,8 @@ fn of_ray<S: Stored>(field: &Field<S>, ray: &PlanRay) -> f64 {
     let delta = distance(plan, ray, span.start.abs().max(span.end.abs())) / AT_WORST;
     let (mut bound, mut least_depth) = (0.0, 0.0);
     for part in parts(plan, ray, span) {
-        let node = |x: &f64| node(field, part, plan.rays.center + ray.at(part.at(*x)), delta);
-        let nodes: Vec<Node> = plan.sampling.rule().nodes().iter().map(node).collect();
+        let values = |x: &f64| values(field, part, plan.rays.center + ray.at(part.at(*x)), delta);
+        let nodes: Vec<Values> = plan.sampling.rule().nodes().iter().map(values).collect();
         let (change, least) = spread(plan, &nodes, part);
         bound += transmittance(least_depth) * change;
         least_depth += least;
@@ -58,33 +55,21 @@ fn of_ray<S: Stored>(field: &Field<S>, ray: &PlanRay) -> f64 {
     bound
 }
 
-fn node<S: Stored>(field: &Field<S>, part: Part, q: DVec3, delta: DVec3) -> Node {
+/// The values that a node at `q` may have; none where its block is transparent.
+fn values<S: Stored>(field: &Field<S>, part: Part, q: DVec3, delta: DVec3) -> Values {
     let q = field.clamped(q);
     let cell = part.cell.unwrap_or_else(|| field.index_cell(q));
-    let (value, at) = (field.in_block(cell, q)?, field.interpolation_cell(cell, q)?);
-    let IndexEntry::Resident { level, .. } = field.plan.index.at(cell) else { return None };
+    let (Some(value), Some(at)) = (field.in_block(cell, q), field.interpolation_cell(cell, q)) else {
+        return vec![None];
+    };
+    let stride = f64::from(field.plan.index.at(cell).level().stride());
     let (min, max) = at.samples.iter().fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(*v), b.max(*v)));
     let gain = (field.plan.bricks.decode().scale / field.plan.bricks.format().unit()).abs();
-    Some((value, gain * (max - min) * delta.element_sum() / f64::from(level.stride())))
-}
-
-/// How far a segment may stray, and the least depth that it may have.
-fn spread(plan: &FramePlan, nodes: &[Node], part: Part) -> (f64, f64) {
-    let values = |node: &Node| node.map_or(vec![None], |(value, stray)| candidates(&plan.transfer, value, stray));
-    let first = values(&nodes[0]);
-    let second = nodes.get(1).map_or(vec![None], values);
-    let own = segment(plan, [first[0], second[0]], part.length);
-    let (mut change, mut least) = (0.0f64, own.depth);
-    for (a, b) in first.iter().flat_map(|a| second.iter().map(move |b| (*a, *b))).skip(1) {
-        let other = segment(plan, [a, b], part.length);
-        change = change.max(difference(&own, &other));
-        least = least.min(other.depth);
-    }
-    (change, least)
+    candidates(&field.plan.transfer, value, gain * (max - min) * delta.element_sum() / stride)
 }
 
 /// The values at which extinction and colour are extreme: the node's own first, the ends, and both sides of knots between.
-fn candidates(transfer: &TransferFunction, value: f64, stray: f64) -> Vec<Option<f64>> {
+fn candidates(transfer: &TransferFunction, value: f64, stray: f64) -> Values {
     if stray == 0.0 {
         return vec![Some(value)];
     }

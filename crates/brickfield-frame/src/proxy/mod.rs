@@ -83,15 +83,13 @@ impl Target {
 
     /// The pixels in bytes of this format, as far as there are both.
     pub fn read(self, bytes: &[u8], pixels: &mut [[f32; 4]]) {
-        let channel = |bytes: &[u8]| match *bytes {
-            [a, b, c, d] => f32::from_le_bytes([a, b, c, d]),
-            [a, b] => half::f16::from_le_bytes([a, b]).to_f32(),
-            _ => f32::NAN,
-        };
-        let channel_bytes = self.pixel_bytes() / 4;
-        for (pixel, bytes) in pixels.iter_mut().zip(bytes.chunks_exact(self.pixel_bytes())) {
-            for (to, from) in pixel.iter_mut().zip(bytes.chunks_exact(channel_bytes)) {
-                *to = channel(from);
+        let n_pixels = pixels.len().min(bytes.len() / self.pixel_bytes());
+        let (bytes, pixels) = (&bytes[..n_pixels * self.pixel_bytes()], &mut pixels[..n_pixels]);
+        match self {
+            Target::Float32 => bytemuck::cast_slice_mut(pixels).copy_from_slice(bytes),
+            Target::Float16 => {
+                let channels = bytes.chunks_exact(2).map(|b| half::f16::from_le_bytes([b[0], b[1]]).to_f32());
+                pixels.as_flattened_mut().iter_mut().zip(channels).for_each(|(to, from)| *to = from);
             }
         }
     }
