@@ -7,5 +7,5 @@ mod discrete;
 mod fast;
 
 pub use continuous::{Continuous, ContinuousOptions, RayIntegral, continuous, continuous_ray};
-pub use discrete::{Discrete, discrete, position_rounding};
+pub use discrete::{Discrete, discrete, filter_rounding, position_rounding};
 pub use fast::CpuBackend;

@@ -15,6 +15,7 @@ mod plan;
 mod proxy;
 mod rays;
 mod sampling;
+mod surfaces;
 mod uniform;
 mod value_scale;
 
@@ -30,7 +31,8 @@ pub use occupancy::{MACROCELL_SIDE, Occupancy};
 pub use pass::Pass;
 pub use plan::FramePlan;
 pub use proxy::{ProxyCorner, ProxyGeometry, Target};
-pub use rays::{PlanRay, PlaneStacks, RayFrame, Steps};
-pub use sampling::{Division, Lengths, Mode, Placement, Sampling, SamplingError};
+pub use rays::{PlanRay, RayFrame};
+pub use sampling::{Division, Lengths, Mode, Sampling, SamplingError};
+pub use surfaces::{Placement, PlacementError, PlaneStacks, Steps};
 pub use uniform::{FrameUniforms, KnotUniform};
 pub use value_scale::ValueScale;

@@ -1,16 +1,18 @@
 //! The rays of a frame in sample space, in a form that keeps its digits in f32.
 
 use brickfield_core::glam::{DVec2, DVec3, UVec2};
-use brickfield_core::{Aabb, Camera, Grid, IndexPos, Level, Projection, SamplePos, WorldPos};
+use brickfield_core::{Aabb, Camera, Grid, IndexPos, Projection, SamplePos, WorldPos};
 
-use crate::{Division, Placement, Sampling};
+use crate::{Placement, PlaneStacks, Steps};
 
 /// The rays of a frame in sample space.
 ///
 /// A ray is q(t) = center + anchor + direction (t - t_anchor), t in world units past its surface 0 ([`Placement`]); surface k is
-/// at t = k steps times the ray's stretch. Its anchor is where it meets the plane through the volume's centre; all of it is
-/// affine in the picture position but for the length that normalises the direction. So no term is larger than the volume,
-/// wherever the eye and the origin are, and f32 holds a position to about 1e-7 of the volume's size.
+/// at t = k steps times the ray's stretch. Its anchor is where it meets the plane through the volume's centre, or an eye within
+/// the sphere around the volume; all of it is affine in the picture position but for the length that normalises the
+/// direction. So no term is much larger than the volume, wherever the eye and the origin are, and f32 holds a position to about 1e-7 of the
+/// volume's size. (Rays that meet an anchors' plane at a slant, at the rim of a lens wider than 170 degrees far from the
+/// volume, lose the cosine of that angle.)
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayFrame {
     /// Width and height of the picture, in pixels.
@@ -38,35 +40,8 @@ pub struct RayFrame {
     pub planes: PlaneStacks,
 }
 
-/// Where a plane of every stack lies, in sample space. From here no middle between planes of whole or half voxels, at any
-/// level, lies on a brick's face, where rounding would decide which brick has it.
-const FIRST_PLANE: DVec3 = DVec3::splat(-1.0 / 6.0);
-/// What the cosines to x, y and z are multiplied by before they are compared.
-pub(crate) const PREFERENCE: DVec3 = DVec3::new(1.0, 1.0 - 1.0 / 4096.0, 1.0 - 2.0 / 4096.0);
-
-/// What makes the surfaces of a frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Steps {
-    /// Distance between surfaces, in world units.
-    pub step_world: f64,
-    /// The surfaces.
-    pub placement: Placement,
-    /// The coarsest level whose steps must fall on surfaces: surface 0 is one of its own.
-    pub coarsest: Level,
-}
-
-/// Three stacks of planes, a step apart in the world: of constant x, y, z in sample space.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PlaneStacks {
-    /// Distance between two planes a voxel apart, in world units: what a direction in voxels per world unit is multiplied by
-    /// to give the cosines of its angles to the planes' normals.
-    pub voxel_world: DVec3,
-    /// The first planes that rays towards greater x, y, z meet; relative to the frame's centre.
-    pub low: DVec3,
-    /// The first planes that rays towards smaller x, y, z meet; relative to the frame's centre.
-    pub high: DVec3,
-}
-
+/// Roundings of a term of a position, times the unit roundoff of f32.
+const ROUNDING: f64 = 8.0 / (1u32 << 24) as f64;
 /// One ray of a [`RayFrame`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanRay {
@@ -82,27 +57,6 @@ pub struct PlanRay {
     pub stretch: f64,
 }
 
-impl Steps {
-    /// Spherical shells.
-    pub fn shells(step_world: f64) -> Steps {
-        Steps { step_world, placement: Placement::Shells, coarsest: Level(0) }
-    }
-
-    /// The surfaces of a sampling of bricks up to level `coarsest`.
-    pub fn of(sampling: &Sampling, coarsest: Level) -> Steps {
-        let coarsest = match sampling.division() {
-            Division::Ray => Level(0),
-            Division::Brick => coarsest,
-        };
-        Steps { step_world: sampling.step_world(), placement: sampling.placement(), coarsest }
-    }
-
-    /// Distance between the coarsest level's surfaces.
-    fn coarsest_world(&self) -> f64 {
-        self.step_world * f64::from(self.coarsest.stride())
-    }
-}
-
 impl RayFrame {
     /// The rays of a camera's picture of a grid, with the surfaces of `steps`.
     ///
@@ -112,8 +66,13 @@ impl RayFrame {
         let turn = |v: DVec3| grid.world_to_index().transform_vector3(v);
         let center = domain.center();
         let center_world = grid.world(IndexPos::from(SamplePos(center))).0;
-        let depth = (center_world - camera.eye()).dot(camera.forward());
         let rays = camera.pixel_rays(size);
+        // Near an eye within the volume, rays at the rim of a wide lens are far from all others: the eye is near all.
+        let is_near = (to_sample(camera.eye()) - center).length() <= 0.5 * domain.diagonal();
+        let depth = match camera.projection() {
+            Projection::Perspective { .. } if is_near => 0.0,
+            _ => (center_world - camera.eye()).dot(camera.forward()),
+        };
         let (right, down) = (turn(camera.right() * rays.pixel()), turn(camera.up() * -rays.pixel()));
         let anchor0 = to_sample(camera.eye() + camera.forward() * depth) - center;
         let forward = turn(camera.forward());
@@ -143,7 +102,7 @@ impl RayFrame {
         let corners = from_eye(camera, grid, domain);
         let nearest = corners.iter().map(|c| c.dot(camera.forward())).fold(f64::INFINITY, f64::min);
         // The surface before the nearest point: no surface is farther from the eye than spheres are.
-        let coarsest = steps.coarsest_world();
+        let coarsest = steps.coarsest_world;
         let start = ((nearest / coarsest).floor() * coarsest).max(0.0);
         let farthest = farthest(camera, &corners);
         let n_segments = (farthest - start) / steps.step_world;
@@ -152,13 +111,11 @@ impl RayFrame {
         match steps.placement {
             Placement::Shells | Placement::ViewportPlanes => frame,
             Placement::TessellatedShells { .. } => {
-                // The facet in the middle lies deepest in its sphere: its surfaces are the closest.
-                let closest = frame.facet_normal(frame.facet_of(size.x / 2, size.y / 2)).length();
-                let n_segments = (farthest * closest - start) / steps.step_world;
+                let n_segments = (farthest / frame.least_stretch() - start) / steps.step_world;
                 RayFrame { n_segments: n_segments.ceil().max(1.0), ..frame }
             }
             Placement::ObjectPlanes => {
-                let planes = PlaneStacks::new(grid, center, domain, steps);
+                let planes = PlaneStacks::new(grid, domain);
                 RayFrame { planes, n_segments: planes.most_segments(steps.step_world), ..frame }
             }
         }
@@ -173,6 +130,28 @@ impl RayFrame {
         let shells = RayFrame { placement: Placement::Shells, ..*self }.ray(x, y);
         let axis = self.planes.other_axis(shells.direction, rounding)?;
         Some(self.planes.through(shells, axis))
+    }
+
+    /// The least [`stretch`](PlanRay::stretch) that a ray may have.
+    pub fn least_stretch(&self) -> f64 {
+        match self.placement {
+            // The facet in the middle lies deepest in its sphere: its surfaces are the closest.
+            Placement::TessellatedShells { .. } => {
+                self.facet_normal(self.facet_of(self.size.x / 2, self.size.y / 2)).length().recip()
+            }
+            _ => 1.0,
+        }
+    }
+
+    /// How far f32 may put a position of a ray from where it is, along each axis, in voxels, for parameters up to `far`.
+    ///
+    /// A position is anchor + direction (t - t_anchor), relative to the centre. Each of its terms is the result of at most eight
+    /// roundings (three products and two sums for the anchor, the same and a normalisation for the direction, a product and
+    /// a sum for t), each of at most 2^-24 of the term; and so is what shifts it to the first sample and divides it by the
+    /// brick's cells. So it is off by at most 8 * 2^-24 * (|center| + |anchor| + |direction| (|t| + |t_anchor|)), a few times the
+    /// volume's extent times 5e-7.
+    pub fn rounding(&self, ray: &PlanRay, far: f64) -> DVec3 {
+        (self.center.abs() + ray.anchor.abs() + ray.direction.abs() * (far + ray.t_anchor.abs())) * ROUNDING
     }
 
     /// The ray through the centre of pixel (x, y).
@@ -205,52 +184,6 @@ impl RayFrame {
             }
             Placement::ObjectPlanes => self.planes.through(shells, self.planes.axis(direction)),
         }
-    }
-}
-
-impl PlaneStacks {
-    fn new(grid: &Grid, center: DVec3, domain: &Aabb, steps: &Steps) -> PlaneStacks {
-        let gradient = grid.world_to_index().matrix3.transpose();
-        let [x, y, z] = [gradient.x_axis, gradient.y_axis, gradient.z_axis].map(DVec3::length);
-        let voxel_world = DVec3::new(x, y, z).recip();
-        let apart = steps.coarsest_world() / voxel_world;
-        PlaneStacks {
-            voxel_world,
-            low: FIRST_PLANE + ((domain.min - FIRST_PLANE) / apart).floor() * apart - center,
-            high: FIRST_PLANE + ((domain.max - FIRST_PLANE) / apart).ceil() * apart - center,
-        }
-    }
-
-    fn most_segments(&self, step_world: f64) -> f64 {
-        ((self.high - self.low) * self.voxel_world / step_world).max_element().ceil().max(1.0)
-    }
-
-    /// The axis whose planes a ray of this direction (voxels per world unit) takes: the steepest. Where two are within
-    /// 1/4096, the first: pictures of boxes seen along a diagonal shall not depend on rounding.
-    #[inline]
-    pub fn axis(&self, direction: DVec3) -> usize {
-        let steep = (direction * self.voxel_world).abs() * PREFERENCE;
-        match steep.x >= steep.y && steep.x >= steep.z {
-            true => 0,
-            false if steep.y >= steep.z => 1,
-            false => 2,
-        }
-    }
-
-    /// The other axis that a ray of this direction would take if cosines were off by `rounding`.
-    fn other_axis(&self, direction: DVec3, rounding: f64) -> Option<usize> {
-        let steep = (direction * self.voxel_world).abs() * PREFERENCE;
-        let own = self.axis(direction);
-        (0..3).find(|axis| *axis != own && steep[*axis] >= steep[own] - rounding)
-    }
-
-    /// The ray with the planes of an axis as its surfaces.
-    fn through(&self, shells: PlanRay, axis: usize) -> PlanRay {
-        let d = shells.direction[axis];
-        let first = if d > 0.0 { self.low[axis] } else { self.high[axis] };
-        let t_anchor = (shells.anchor[axis] - first) / d;
-        let t_eye = t_anchor - (shells.t_anchor - shells.t_eye);
-        PlanRay { t_anchor, t_eye, stretch: 1.0 / (d * self.voxel_world[axis]).abs(), ..shells }
     }
 }
 
@@ -324,7 +257,7 @@ mod tests {
         let eye = grid.world_box().center() + DVec3::new(40.0, 25.0, 12.0);
         let camera = Camera::look_at(eye, grid.world_box().center(), DVec3::Z, projection).unwrap();
         let domain = Aabb { min: DVec3::splat(-0.5), max: grid.dims().as_dvec3() - 0.5 };
-        let steps = Steps { step_world: 0.7, placement, coarsest: Level(2) };
+        let steps = Steps { step_world: 0.7, placement, coarsest_world: 2.8 };
         (RayFrame::new(&camera, &grid, UVec2::new(40, 30), &domain, &steps), camera, grid)
     }
 
@@ -350,8 +283,10 @@ mod tests {
                 let (p, camera, grid) = surface(Placement::ObjectPlanes, pixel, k);
                 let direction = camera.pixel_rays(UVec2::new(40, 30)).pixel_ray(pixel.0, pixel.1).direction;
                 let steepest = direction.abs().to_array().iter().position(|c| *c == direction.abs().max_element());
-                let plane = grid.world(IndexPos::from(SamplePos(FIRST_PLANE))).0;
-                assert!(whole_steps((camera.eye() + p - plane)[steepest.unwrap()]), "{p}");
+                let axis = steepest.unwrap();
+                let (low, high) = (DVec3::splat(-1.0 / 6.0), grid.dims().as_dvec3() + 1.0 / 6.0);
+                let first = grid.world(IndexPos(if direction[axis] > 0.0 { low } else { high })).0;
+                assert!(whole_steps((camera.eye() + p - first)[axis]), "{p}");
             }
         }
     }

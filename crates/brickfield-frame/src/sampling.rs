@@ -2,37 +2,17 @@
 
 use brickfield_optics::QuadratureRule;
 
-/// How a ray is sampled: where its segments end, which rule integrates them, and whether shortcuts are allowed.
+/// How a ray is sampled: how long its segments are, which rule integrates them, and whether shortcuts are allowed.
 ///
-/// Segment k lies between surfaces k and k + 1 of the [`Placement`], cut to what is divided ([`Division`]); the rule's nodes
-/// lie in the cut segment, which has its true length. [`Lengths::Nominal`] is the exception.
+/// Segment k lies between surfaces k and k + 1 of the rays' [`Placement`](crate::Placement), cut to what is divided
+/// ([`Division`]); the rule's nodes lie in the cut segment, which has its true length. [`Lengths::Nominal`] is the exception.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
     step_world: f64,
     rule: QuadratureRule,
     mode: Mode,
-    placement: Placement,
     division: Division,
     lengths: Lengths,
-}
-
-/// The surfaces between which segments lie: the proxy geometries of LaMar, Hamann and Joy 1999, section 4.2.
-///
-/// Along each ray they are evenly spaced; how far apart, in steps, is [`PlanRay::stretch`](crate::PlanRay::stretch).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Placement {
-    /// Spheres around the eye, a step apart on every ray. For parallel rays: planes.
-    #[default]
-    Shells,
-    /// Those spheres as triangles: the picture's squares of so many pixels a side, cut along their falling diagonals, with
-    /// their corners on the sphere.
-    #[allow(missing_docs)]
-    TessellatedShells { facet_pixels: u32 },
-    /// Planes parallel to the picture, a step apart: a ray at angle a to the view direction has 1 / cos a steps between two.
-    ViewportPlanes,
-    /// Planes of constant x, y or z of the grid, a step apart in the world. Each ray takes the stack that it meets at the
-    /// steepest angle.
-    ObjectPlanes,
 }
 
 /// What is divided into segments.
@@ -76,8 +56,6 @@ pub enum SamplingError {
     Step { step_world: f64 },
     #[error("a transmittance floor of {floor}; it must be at least 0 and below 1")]
     TransmittanceFloor { floor: f64 },
-    #[error("facets of {facet_pixels} pixels; a side must be 1 to {most}")]
-    FacetPixels { facet_pixels: u32, most: u32 },
     #[error(
         "nominal lengths with the rule {}: they are for the rule {}, whose one node is a segment's middle", rule.name(), QuadratureRule::MidpointExponential.name()
     )]
@@ -97,23 +75,8 @@ impl Mode {
     }
 }
 
-impl Placement {
-    /// Most pixels along a facet's side.
-    pub const MOST_FACET_PIXELS: u32 = 1 << 15;
-
-    /// The name in shader conditions (`@if(name)`), options and reports.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Placement::Shells => "shells",
-            Placement::TessellatedShells { .. } => "tessellated-shells",
-            Placement::ViewportPlanes => "viewport-planes",
-            Placement::ObjectPlanes => "object-planes",
-        }
-    }
-}
-
 impl Sampling {
-    /// A sampling of whole rays by shells, with true lengths.
+    /// A sampling of whole rays, with true lengths.
     ///
     /// # Errors
     /// A step that is not finite and positive, a transmittance floor outside [0, 1).
@@ -126,23 +89,9 @@ impl Sampling {
                 Err(SamplingError::TransmittanceFloor { floor })
             }
             _ => {
-                let (placement, division, lengths) = (Placement::Shells, Division::Ray, Lengths::True);
-                Ok(Sampling { step_world, rule, mode, placement, division, lengths })
+                let (division, lengths) = (Division::Ray, Lengths::True);
+                Ok(Sampling { step_world, rule, mode, division, lengths })
             }
-        }
-    }
-
-    /// The sampling with other surfaces.
-    ///
-    /// # Errors
-    /// Facets without pixels, or of more than [`Placement::MOST_FACET_PIXELS`].
-    pub fn placed(self, placement: Placement) -> Result<Sampling, SamplingError> {
-        let most = Placement::MOST_FACET_PIXELS;
-        match placement {
-            Placement::TessellatedShells { facet_pixels } if !(1..=most).contains(&facet_pixels) => {
-                Err(SamplingError::FacetPixels { facet_pixels, most })
-            }
-            _ => Ok(Sampling { placement, ..self }),
         }
     }
 
@@ -178,11 +127,6 @@ impl Sampling {
         self.mode
     }
 
-    /// The surfaces between segments.
-    pub fn placement(&self) -> Placement {
-        self.placement
-    }
-
     /// What is divided into segments.
     pub fn division(&self) -> Division {
         self.division
@@ -213,7 +157,6 @@ mod tests {
         assert!(error(Sampling::new(0.0, midpoint, Mode::Exact)).contains("step of 0"));
         assert!(error(Sampling::new(1.0, midpoint, Mode::Fast { transmittance_floor: 1.0 })).contains("floor of 1"));
         let good = Sampling::new(1.0, midpoint, Mode::Exact).unwrap();
-        assert!(error(good.placed(Placement::TessellatedShells { facet_pixels: 0 })).contains("facets of 0 pixels"));
         assert!(good.weighted(Lengths::Nominal).is_ok());
         let gauss = Sampling::new(1.0, QuadratureRule::Gauss2, Mode::Exact).unwrap();
         assert!(error(gauss.weighted(Lengths::Nominal)).contains("gauss2"));

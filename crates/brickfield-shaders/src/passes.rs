@@ -70,7 +70,7 @@ fn rounds_per_segment(plan: &FramePlan) -> f64 {
 }
 
 fn rows_per_pass(plan: &FramePlan, group_height: u32) -> u32 {
-    let voxels_per_segment = plan.rays.direction[0].length() * plan.sampling.step_world();
+    let voxels_per_segment = plan.rays.direction[0].length() * plan.sampling.step_world() * plan.rays.least_stretch();
     let n_segments = (plan.visible.diagonal() / voxels_per_segment).clamp(1.0, segments_per_pass(plan));
     let nodes_per_row = n_segments * plan.sampling.rule().nodes().len() as f64 * f64::from(plan.size().x);
     // A float that is too large becomes the largest integer.

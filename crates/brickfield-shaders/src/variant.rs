@@ -1,8 +1,6 @@
 //! Which shader a plan needs.
 
-use brickfield_frame::{
-    Division, Feature, FeatureSet, FramePlan, Lengths, Placement, QuadratureRule, Sampling, ShaderFunction,
-};
+use brickfield_frame::{Division, Feature, FeatureSet, FramePlan, Lengths, Placement, QuadratureRule, ShaderFunction};
 
 use crate::passes::has_long_rays;
 
@@ -28,7 +26,7 @@ pub struct Variant {
     pub entry: Entry,
 }
 
-/// The segments of a sampling, as far as shaders differ.
+/// The segments of a plan, as far as shaders differ.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[allow(missing_docs)]
 pub struct Segments {
@@ -49,9 +47,10 @@ pub enum Surfaces {
 }
 
 impl Segments {
-    /// The segments of a sampling.
-    pub fn of(sampling: &Sampling) -> Segments {
-        let surfaces = match sampling.placement() {
+    /// The segments of a plan.
+    pub fn of(plan: &FramePlan) -> Segments {
+        let sampling = &plan.sampling;
+        let surfaces = match plan.rays.placement {
             Placement::Shells => Surfaces::Shells,
             Placement::TessellatedShells { .. } => Surfaces::TessellatedShells,
             Placement::ViewportPlanes => Surfaces::ViewportPlanes,
@@ -178,7 +177,7 @@ impl Variant {
         Variant {
             features: plan.features,
             rule: plan.sampling.rule(),
-            segments: Segments::of(&plan.sampling),
+            segments: Segments::of(plan),
             search: KnotSearch::of(plan),
             long_rays: entry == Entry::March && has_long_rays(plan),
             integer_samples: plan.reads_integers(),

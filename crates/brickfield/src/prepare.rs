@@ -6,8 +6,8 @@ use brickfield_bricks::BrickTree;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BrickId, Level, ValueRange};
 use brickfield_frame::{
-    Beams, Division, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, Placement, ProxyGeometry, RayFrame,
-    Sampling, SamplingError, Steps,
+    Beams, Division, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, Placement, PlacementError,
+    ProxyGeometry, RayFrame, Sampling, SamplingError, Steps,
 };
 use brickfield_lod::{Selection, back_to_front, select_cut};
 use brickfield_optics::QuadratureRule;
@@ -44,6 +44,8 @@ pub enum PrepareError {
     TooManyPolygons { n_polygons: f64, limit: u32 },
     #[error(transparent)]
     Sampling(#[from] SamplingError),
+    #[error(transparent)]
+    Placement(#[from] PlacementError),
 }
 
 /// Most pixels along a side of a picture.
@@ -74,11 +76,11 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
         return Err(PrepareError::Step { step_voxels: scene.step_voxels });
     }
     let sampling = Sampling::new(step_world, scene.rule, scene.mode)?;
-    let sampling = sampling.placed(scene.placement)?.divided(scene.division).weighted(scene.lengths)?;
+    let sampling = sampling.divided(scene.division).weighted(scene.lengths)?;
     check_segments(grid.world_box().diagonal() / step_world)?;
     let selection = select_cut(tree.layout(), grid, &scene.view(), &scene.detail);
     let coarsest = selection.drawn().map(|id| id.level).max().unwrap_or(Level(0));
-    let steps = Steps::of(&sampling, coarsest);
+    let steps = Steps::of(&sampling, scene.placement, coarsest)?;
     let rays = RayFrame::new(&scene.camera, grid, scene.size, &volume_box(tree), &steps);
     check_segments(rays.n_segments)?;
     let resident = resident_bricks(tree, scene, &selection, &domain);

@@ -10,7 +10,6 @@ mod case;
 mod cases;
 mod check;
 mod contestant;
-mod filter;
 mod naive;
 mod outcome;
 mod pictures;

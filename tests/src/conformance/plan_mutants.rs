@@ -295,7 +295,7 @@ fn resample(plan: &mut FramePlan, change: impl Fn(&Sampling) -> (f64, Quadrature
     let (step, rule, mode) = change(&plan.sampling);
     let old = plan.sampling;
     let new = Sampling::new(step, rule, mode).expect("a mutant's sampling is a sampling");
-    let new = new.placed(old.placement()).expect("it was placed so").divided(old.division());
+    let new = new.divided(old.division());
     plan.sampling = new.weighted(old.lengths()).unwrap_or(new);
 }
 

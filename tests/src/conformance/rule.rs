@@ -5,7 +5,7 @@
 //! Both are wider by the reference's `ambiguity` of the pixel; the narrow one also by what one rounding of each term of a
 //! position may change (`position_rounding`), which is more than 1e-5 where the transfer function is steep and opaque.
 //!
-//! **Fast mode** adds, per pixel, what hardware filtering may do (`filter`) and, where a ray may end early, the
+//! **Fast mode** adds, per pixel, what hardware filtering may do (`filter_rounding`) and, where a ray may end early, the
 //! transmittance floor: that is the most that any channel can lose behind the point where it ends.
 //! **Polygons** are blended: of each segment that a ray sees, three roundings remain, of 1 - alpha, of its product with what lies
 //! behind and of the sum, each of at most the target's unit roundoff: 2^-24, or 2^-11 for 16-bit floats, in which a device may blend.
@@ -13,14 +13,12 @@
 //!
 //! A tolerance so wide that the picture could be anything is no test: see [`Tolerance::is_empty_promise`].
 
-use brickfield::cpu::{Discrete, position_rounding};
-use brickfield::frame::{Capabilities, Division, FramePlan, Lengths, Mode, Target};
+use brickfield::cpu::{Discrete, filter_rounding, position_rounding};
+use brickfield::frame::{Capabilities, Division, FramePlan, Mode, Target};
 use brickfield_core::glam::UVec2;
 use brickfield_core::{Image, TransferFunction};
 
 use crate::metrics::{Errors, MetricError, errors, quantile};
-
-use super::filter::filter_bound;
 
 /// The share of pixels that must be within the narrow bound.
 const BULK: f64 = 0.999;
@@ -67,8 +65,6 @@ pub enum Complaint {
     NotComparable(#[from] MetricError),
     #[error("rays of {n_samples} samples: the rules end at {MOST_SAMPLES}")]
     NoRule { n_samples: u64 },
-    #[error("fast mode has a rule for segments of whole rays with their true lengths only")]
-    NoFastRule,
     #[error("a quarter of the pixels may differ by more than {bound:.2}: the tolerance promises nothing")]
     EmptyPromise { bound: f64 },
     #[error("the picture shows {found}, but the case says {stated}")]
@@ -91,10 +87,7 @@ impl Tolerance {
         let Mode::Fast { transmittance_floor } = plan.sampling.mode() else {
             return Ok(Tolerance { most: exact(most), bulk: narrow(exact(BULK_BOUND)) });
         };
-        if plan.sampling.division() == Division::Brick || plan.sampling.lengths() == Lengths::Nominal {
-            return Err(Complaint::NoFastRule);
-        }
-        let filter = filter_bound(plan, device.sub_texel_bits);
+        let filter = filter_rounding(plan, device.sub_texel_bits);
         let ends = |i: usize| {
             let transmittance = 1.0 - reference.image.pixels()[i][3];
             if transmittance <= transmittance_floor + filter[i] + most { transmittance_floor } else { 0.0 }

@@ -1,8 +1,8 @@
 //! Where interpolated values come from: the eight samples around a position.
 
 use brickfield::frame::{FramePlan, IndexEntry};
+use brickfield_core::Volume;
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{ValueRange, Volume};
 
 /// The eight data values around a position, x varying fastest, and where it lies between them.
 #[derive(Clone, Copy, Debug)]
@@ -29,12 +29,6 @@ impl Cell {
         let weight =
             |axis: usize, c: usize| if c >> axis & 1 == 1 { self.fraction[axis] } else { 1.0 - self.fraction[axis] };
         self.values.iter().enumerate().map(|(c, v)| v * weight(0, c) * weight(1, c) * weight(2, c)).sum()
-    }
-
-    /// Least and greatest of the corners.
-    pub(crate) fn range(&self) -> ValueRange {
-        let start = ValueRange { min: self.values[0], max: self.values[0] };
-        self.values.iter().fold(start, |r, v| ValueRange { min: r.min.min(*v), max: r.max.max(*v) })
     }
 }
 

@@ -74,7 +74,10 @@ fn object_planes(volume: &Volume, ray: &Ray, nominal: f64) -> Surfaces {
     let cosines = [0, 1, 2].map(|axis| ray.direction.dot(through(axis)));
     let preferred = [0, 1, 2].map(|axis| cosines[axis].abs() * (1.0 - axis as f64 / 4096.0));
     let axis = (1..3).fold(0, |best, axis| if preferred[axis] > preferred[best] { axis } else { best });
-    let on_plane = grid.world(IndexPos(DVec3::splat(0.5 - 1.0 / 6.0))).0;
+    // A sixth of a voxel before the volume.
+    let (low, high) = (DVec3::splat(-1.0 / 6.0), grid.dims().as_dvec3() + 1.0 / 6.0);
+    let ahead = grid.world_to_index().transform_vector3(ray.direction)[axis] > 0.0;
+    let on_plane = grid.world(IndexPos(if ahead { low } else { high })).0;
     let origin = (on_plane - ray.origin).dot(through(axis)) / cosines[axis];
     Surfaces { origin, step: nominal / cosines[axis].abs() }
 }

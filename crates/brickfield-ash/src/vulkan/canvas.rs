@@ -54,9 +54,10 @@ impl Canvas {
     /// A canvas, undefined until it is cleared.
     ///
     /// # Errors
-    /// A queue that does not draw, a format that does not blend, no memory.
+    /// A queue that does not draw, a format that does not blend, a size that is not drawn in one piece, no memory.
     pub(crate) fn new(device: &Arc<Device>, target: Target, size: UVec2) -> Result<Canvas, RenderError> {
         check(device, target)?;
+        check_size(&device.physical().limits, size)?;
         let image = Image::canvas(device, target, size)?;
         let pass = RenderPass::new(device, target)?;
         let views = [image.view];
@@ -89,6 +90,16 @@ fn check(device: &Device, target: Target) -> Result<(), RenderError> {
     match device.format_features(target_format(target)).contains(blends) {
         true => Ok(()),
         false => Err(RenderError::Unsupported { what }),
+    }
+}
+
+/// Images may be larger than what is drawn into.
+fn check_size(limits: &vk::PhysicalDeviceLimits, size: UVec2) -> Result<(), RenderError> {
+    let viewport = UVec2::from(limits.max_viewport_dimensions);
+    let most = UVec2::new(limits.max_framebuffer_width, limits.max_framebuffer_height).min(viewport);
+    match size.cmple(most).all() {
+        true => Ok(()),
+        false => Err(RenderError::ImageTooLarge { size, limit: most.min_element() }),
     }
 }
 

@@ -1,10 +1,9 @@
 //! By how much a pixel could change because f32 puts a node on the other side of a jump.
 //!
-//! **Distance.** A position in f32 is anchor + direction (t - t_anchor), relative to the frame's centre. Each of its terms is
-//! the result of at most eight roundings (three products and two sums for the anchor, the same and a normalisation for
-//! the direction, a product and a sum for t), each of at most 2^-24 of the term; and so is what shifts it to the first sample
-//! and divides it by the brick's cells. So along an axis a position is off by at most
-//! 8 * 2^-24 * (|center| + |anchor| + |direction| (|t| + |t_anchor|)), a few times the volume's extent times 5e-7.
+//! **Distance.** How far a position is off along an axis says [`RayFrame::rounding`](brickfield_frame::RayFrame::rounding).
+//!
+//! Where segments end with their brick, a ray that runs along a face within that distance may be in either block, and has the
+//! segments of that one.
 //!
 //! **Value.** The interpolated value moves by at most that distance times the range of its cell, and by eight more
 //! roundings of the numbers that decoding adds up.
@@ -19,13 +18,13 @@ use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, PlanRay};
 use brickfield_optics::{Segment, alpha, transmittance};
 
 use super::field::{Field, Stored};
-use super::walk::{Part, clip, middle, parts, segments, whole};
+use super::walk::{Part, clip, middle, parts, parts_in_block, segments, whole};
 use super::{part_values, relative, segment};
 use crate::blocks::Blocks;
 
 /// How far the cosines of a ray's angles to planes may be off: a few roundings of numbers below 1.
 pub(super) const TIE: f64 = 1e-6;
-/// Roundings of a term, times the unit roundoff of f32.
+/// Roundings of a number that decoding adds up, times the unit roundoff of f32.
 const ROUNDING: f64 = 8.0 / (1u32 << 24) as f64;
 
 /// What makes a plan's pixels ambiguous.
@@ -57,7 +56,7 @@ impl Ambiguity {
         let plan = field.plan;
         let domain = relative(&plan.domain, plan.rays.center);
         let far = domain.extent().length() / ray.direction.length() + ray.t_anchor.abs();
-        let delta = distance(plan, ray, far);
+        let delta = plan.rays.rounding(ray, far);
         match clip(ray, &domain, ray.t_eye) {
             Some(_) if clip(ray, &grown(&domain, -delta), ray.t_eye).is_none() => self.grazing(ray, &domain, delta),
             None => self.grazing(ray, &domain, delta),
@@ -73,16 +72,21 @@ impl Ambiguity {
 
     fn inside<S: Stored>(&self, field: &Field<S>, ray: &PlanRay, span: Span) -> f64 {
         let sampling = &field.plan.sampling;
-        let delta = distance(field.plan, ray, span.start.abs().max(span.end.abs()));
+        let delta = field.plan.rays.rounding(ray, span.start.abs().max(span.end.abs()));
         let appearing = match sampling.lengths() {
             Lengths::True => 0.0,
             Lengths::Nominal => self.appearing(field, ray, span, delta),
         };
-        let faces_matter = self.several_kinds && sampling.division() == Division::Ray;
-        match faces_matter || !self.jumps.is_empty() {
-            true => appearing + self.changing(field, ray, span, delta),
-            false => appearing,
-        }
+        let (nodes_stray, rays_stray) = match sampling.division() {
+            Division::Ray => (self.several_kinds, false),
+            Division::Brick => (false, self.several_kinds),
+        };
+        let changing = match nodes_stray || !self.jumps.is_empty() {
+            true => self.changing(field, ray, span, delta),
+            false => 0.0,
+        };
+        let straying = if rays_stray { straying(field, ray, span, delta) } else { 0.0 };
+        appearing + changing + straying
     }
 
     /// The change by nodes that fall on the other side of a jump.
@@ -168,9 +172,67 @@ impl Ambiguity {
     }
 }
 
-/// How far a position of the ray may be off along each axis, in voxels, for parameters up to `far`.
-pub(super) fn distance(plan: &FramePlan, ray: &PlanRay, far: f64) -> DVec3 {
-    (plan.rays.center.abs() + ray.anchor.abs() + ray.direction.abs() * (far + ray.t_anchor.abs())) * ROUNDING
+/// The change by a ray that runs along the face of a block within rounding, and may be in the block beside it, which has other
+/// segments.
+fn straying<S: Stored>(field: &Field<S>, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
+    let plan = field.plan;
+    let (mut bound, mut least_depth) = (0.0, 0.0f64);
+    for crossing in Blocks::new(plan, ray, span) {
+        let own = sum(field, ray, &[(crossing.span, crossing.cell)]);
+        let (mut change, mut least) = (0.0f64, own.depth);
+        for along in along_faces(ray, &plan.block_box(crossing.cell), crossing.span, delta) {
+            let before = Span { start: crossing.span.start, end: along.start };
+            let after = Span { start: along.end, end: crossing.span.end };
+            for cell in cells_beside(field, ray, crossing.cell, along, delta) {
+                let other = sum(field, ray, &[(before, crossing.cell), (along, cell), (after, crossing.cell)]);
+                change = change.max(difference(&own, &other));
+                least = least.min(other.depth);
+            }
+        }
+        bound += transmittance(least_depth) * change;
+        least_depth += least;
+    }
+    bound
+}
+
+/// Where a ray is within `delta` of a face of a box for a while. Where it goes straight through, rounding moves it from one side
+/// to the other by next to nothing.
+fn along_faces(ray: &PlanRay, b: &Aabb, span: Span, delta: DVec3) -> Vec<Span> {
+    const A_WHILE: f64 = 16.0;
+    let near = |(axis, face): (usize, f64)| {
+        let (d, slab) = (ray.direction[axis], [face - delta[axis], face + delta[axis]]);
+        let at = slab.map(|p| (p - ray.anchor[axis]) / d + ray.t_anchor);
+        match d == 0.0 {
+            true if slab[0] <= ray.anchor[axis] && ray.anchor[axis] <= slab[1] => span,
+            true => Span { start: 0.0, end: 0.0 },
+            false => Span { start: span.start.max(at[0].min(at[1])), end: span.end.min(at[0].max(at[1])) },
+        }
+    };
+    let faces = (0..3).flat_map(|axis| [(axis, b.min[axis]), (axis, b.max[axis])]);
+    let least = A_WHILE * delta.max_element() / ray.direction.length();
+    faces.map(near).filter(|along| along.end - along.start > least).collect()
+}
+
+/// Index cells of the blocks of another kind that a ray may be in where it runs along a face.
+fn cells_beside<S: Stored>(field: &Field<S>, ray: &PlanRay, own: UVec3, along: Span, delta: DVec3) -> Vec<UVec3> {
+    let q = field.plan.rays.center + ray.at(0.5 * (along.start + along.end));
+    let at = |q: DVec3| field.index_cell(field.clamped(q));
+    let kind = |c: UVec3| Kind::of(field.plan.index.at(c));
+    cells(at(q - delta), at(q + delta)).filter(|c| kind(*c) != kind(own)).collect()
+}
+
+/// The light of spans, one behind the other, each in the block that has its cell.
+fn sum<S: Stored>(field: &Field<S>, ray: &PlanRay, spans: &[(Span, UVec3)]) -> Segment {
+    let mut sum = Segment::default();
+    for (span, cell) in spans.iter().filter(|(span, _)| span.start < span.end) {
+        for part in parts_in_block(field.plan, ray, *span, *cell) {
+            let behind = segment(field.plan, part_values(field, ray, part), part.length);
+            let through = transmittance(sum.depth);
+            sum.emission = std::array::from_fn(|c| sum.emission[c] + through * behind.emission[c]);
+            sum.depth += behind.depth;
+        }
+    }
+    sum
 }
 
 /// Whether a point is within `delta` of a box's surface.

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use ambiguity::Ambiguity;
 use field::{Field, Float32, Stored, Unorm8, Unorm16};
-pub use rounding::position_rounding;
+pub use rounding::{filter_rounding, position_rounding};
 use walk::{Part, clip, parts};
 
 /// What a plan's sum is, and how far f32 may stray from it where the field jumps.

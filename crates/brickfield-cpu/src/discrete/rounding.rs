@@ -1,10 +1,21 @@
-//! By how much a pixel may change because f32 rounds where its nodes lie.
+//! By how much a pixel may change because its nodes' values are not exactly those of the plan.
 //!
-//! A position in f32 is the sum of terms as large as the volume (see `ambiguity`), each rounded: along an axis it is off by
-//! about 2^-24 * (|center| + |anchor| + |direction| (|t| + |t_anchor|)), one roundoff of each. The interpolated value moves by at
-//! most that distance times the range of its cell, the extinction and colour of the segment with it, and the pixel by at most
-//! T (|e' - e| + |e^-d' - e^-d|) for each segment, T being the transmittance before it. Where the transfer function is steep and
-//! opaque, that is more than 1e-5.
+//! **Positions.** A position in f32 is the sum of terms as large as the volume (see `RayFrame::rounding`), each rounded: along an
+//! axis it is off by about 2^-24 * (|center| + |anchor| + |direction| (|t| + |t_anchor|)), one roundoff of each. The interpolated
+//! value moves by at most that distance times the range of its cell. Where the transfer function is steep and opaque, that
+//! changes a pixel by more than 1e-5.
+//!
+//! **Weights.** A texture unit snaps the position to 2^-b of a texel along each axis, b being `subTexelPrecisionBits`. A
+//! weight is off by at most 2^-b (truncated; half of it if rounded), which moves the value by at most 2^-b of the greatest
+//! difference along that axis, so all three by at most 3 2^-b R, R being the range of the cell's eight samples.
+//!
+//! **Codes.** Texture units may filter 8-bit texels in 8-bit arithmetic (llvmpipe does): each of the three steps of
+//! interpolation then rounds to the nearest code: at most [`CODES`] codes in all, whatever R is.
+//!
+//! **Pixel.** A node whose value may lie anywhere in v +- dv may have any extinction and colour that the transfer function has
+//! there: this is where its slope enters, exactly and on both sides of knots and jumps. A segment changes the pixel by at most
+//! T (|e' - e| + |e^-d' - e^-d|), T being the greatest transmittance that the segments before it may leave. The sum along the ray
+//! is the bound.
 
 use brickfield_core::TransferFunction;
 use brickfield_core::glam::{DVec3, UVec2};
@@ -12,13 +23,17 @@ use brickfield_frame::{FramePlan, PlanRay, SampleFormat};
 use brickfield_optics::transmittance;
 use rayon::prelude::*;
 
-use super::ambiguity::{Values, distance, spread};
-use super::field::{Field, Float32, Stored, Unorm8, Unorm16};
+use super::ambiguity::{Values, spread};
+use super::field::{Cell, Field, Float32, Stored, Unorm8, Unorm16};
 use super::relative;
 use super::walk::{Part, clip, parts};
 
-/// Roundings that `distance` reckons with at worst; here one of them.
+/// Roundings that `RayFrame::rounding` reckons with at worst; here one of them.
 const AT_WORST: f64 = 8.0;
+/// Rounding of an 8-bit filter: three steps, half a code each.
+const CODES: f64 = 1.5;
+/// Extinction and colour are extreme at the candidates; of wide ranges their product may pass its ends by second order.
+const SECOND_ORDER: f64 = 1.05;
 
 /// For each pixel, rows from the top: what one rounding of each term of its nodes' positions may change, in any channel.
 ///
@@ -27,45 +42,89 @@ const AT_WORST: f64 = 8.0;
 /// # Panics
 /// As [`discrete`](crate::discrete()).
 pub fn position_rounding(plan: &FramePlan) -> Vec<f64> {
+    of_plan(plan, Cause::Positions)
+}
+
+/// For each pixel, rows from the top: what a texture unit that filters with weights of `sub_texel_bits` bits may change, in any
+/// channel.
+///
+/// Cost: several times that of [`discrete`](crate::discrete()).
+///
+/// # Panics
+/// As [`discrete`](crate::discrete()).
+pub fn filter_rounding(plan: &FramePlan, sub_texel_bits: u32) -> Vec<f64> {
+    of_plan(plan, Cause::Filter { sub_texel_bits })
+}
+
+/// Why values are off.
+#[derive(Clone, Copy)]
+enum Cause {
+    Positions,
+    Filter { sub_texel_bits: u32 },
+}
+
+fn of_plan(plan: &FramePlan, cause: Cause) -> Vec<f64> {
     match plan.bricks.format() {
-        SampleFormat::Unorm8 => of_picture::<Unorm8>(plan),
-        SampleFormat::Unorm16 => of_picture::<Unorm16>(plan),
-        SampleFormat::Float32 => of_picture::<Float32>(plan),
+        SampleFormat::Unorm8 => of_picture::<Unorm8>(plan, cause),
+        SampleFormat::Unorm16 => of_picture::<Unorm16>(plan, cause),
+        SampleFormat::Float32 => of_picture::<Float32>(plan, cause),
     }
 }
 
-fn of_picture<S: Stored>(plan: &FramePlan) -> Vec<f64> {
+fn of_picture<S: Stored>(plan: &FramePlan, cause: Cause) -> Vec<f64> {
     let (field, size): (Field<S>, UVec2) = (Field::new(plan), plan.size());
-    let pixel = |i: u32| of_ray(&field, &plan.rays.ray(i % size.x, i / size.x));
+    let pixel = |i: u32| of_ray(&field, &plan.rays.ray(i % size.x, i / size.x), cause);
     (0..size.x * size.y).into_par_iter().map(pixel).collect()
 }
 
-fn of_ray<S: Stored>(field: &Field<S>, ray: &PlanRay) -> f64 {
+fn of_ray<S: Stored>(field: &Field<S>, ray: &PlanRay, cause: Cause) -> f64 {
     let plan = field.plan;
     let Some(span) = clip(ray, &relative(&plan.domain, plan.rays.center), ray.t_eye) else { return 0.0 };
-    let delta = distance(plan, ray, span.start.abs().max(span.end.abs())) / AT_WORST;
+    let delta = plan.rays.rounding(ray, span.start.abs().max(span.end.abs())) / AT_WORST;
+    let stray = |range: f64, stride: f64| match cause {
+        Cause::Positions => range * delta.element_sum() / stride,
+        Cause::Filter { sub_texel_bits } => filtered(plan, range, sub_texel_bits),
+    };
     let (mut bound, mut least_depth) = (0.0, 0.0);
     for part in parts(plan, ray, span) {
-        let values = |x: &f64| values(field, part, plan.rays.center + ray.at(part.at(*x)), delta);
+        let values = |x: &f64| values(field, part, plan.rays.center + ray.at(part.at(*x)), &stray);
         let nodes: Vec<Values> = plan.sampling.rule().nodes().iter().map(values).collect();
         let (change, least) = spread(plan, &nodes, part);
         bound += transmittance(least_depth) * change;
         least_depth += least;
     }
-    bound
+    SECOND_ORDER * bound
 }
 
-/// The values that a node at `q` may have; none where its block is transparent.
-fn values<S: Stored>(field: &Field<S>, part: Part, q: DVec3, delta: DVec3) -> Values {
+/// How far filtering may move a value between samples of a range, in data values.
+fn filtered(plan: &FramePlan, range: f64, bits: u32) -> f64 {
+    let weights = 3.0 * (-f64::from(bits)).exp2() * range;
+    let by_code = plan.bricks.format() == SampleFormat::Unorm8 && bits < f32::MANTISSA_DIGITS - 1;
+    let code = if by_code { CODES * gain(plan) } else { 0.0 };
+    // Interpolation never leaves the cell's range by more than a code.
+    (weights + code).min(range + code)
+}
+
+/// Data values between two stored numbers.
+fn gain(plan: &FramePlan) -> f64 {
+    (plan.bricks.decode().scale / plan.bricks.format().unit()).abs()
+}
+
+/// The values that a node at `q` may have; none where its block is transparent. `stray` takes the range of the samples around it, in
+/// data values, and how many voxels they are apart.
+fn values<S: Stored>(field: &Field<S>, part: Part, q: DVec3, stray: impl Fn(f64, f64) -> f64) -> Values {
     let q = field.clamped(q);
     let cell = part.cell.unwrap_or_else(|| field.index_cell(q));
     let (Some(value), Some(at)) = (field.in_block(cell, q), field.interpolation_cell(cell, q)) else {
         return vec![None];
     };
     let stride = f64::from(field.plan.index.at(cell).level().stride());
-    let (min, max) = at.samples.iter().fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(*v), b.max(*v)));
-    let gain = (field.plan.bricks.decode().scale / field.plan.bricks.format().unit()).abs();
-    candidates(&field.plan.transfer, value, gain * (max - min) * delta.element_sum() / stride)
+    candidates(&field.plan.transfer, value, stray(gain(field.plan) * range(&at), stride))
+}
+
+fn range(cell: &Cell) -> f64 {
+    let (min, max) = cell.samples.iter().fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(*v), b.max(*v)));
+    max - min
 }
 
 /// The values at which extinction and colour are extreme: the node's own first, the ends, and both sides of knots between.

@@ -26,21 +26,28 @@ impl Part {
 
 /// The segments of a ray's span in the domain, front to back (ARCHITECTURE.md, rule 2).
 pub(super) fn parts(plan: &FramePlan, ray: &PlanRay, span: Span) -> Vec<Part> {
-    let sampling = &plan.sampling;
-    let divided = |span, level: Level, cell| {
-        let nominal = sampling.step_world() * f64::from(level.stride());
-        let uncut = segments(span, nominal * ray.stretch);
-        match sampling.lengths() {
-            Lengths::True => uncut.filter_map(|s| cut(s, span, cell)).collect::<Vec<_>>(),
-            Lengths::Nominal => uncut.filter(|s| is_inside(middle(s), span)).map(|s| whole(s, nominal, cell)).collect(),
-        }
-    };
-    match sampling.division() {
-        Division::Ray => divided(span, Level(0), None),
+    match plan.sampling.division() {
+        Division::Ray => divided(plan, ray, span, Level(0), None),
         Division::Brick => {
-            let visible = Blocks::new(plan, ray, span).filter(|c| matches!(c.entry, IndexEntry::Resident { .. }));
-            visible.flat_map(|c| divided(c.span, c.entry.level(), Some(c.cell))).collect()
+            Blocks::new(plan, ray, span).flat_map(|c| parts_in_block(plan, ray, c.span, c.cell)).collect()
         }
+    }
+}
+
+/// The segments of a span, if all of it is in the block that has an index cell.
+pub(super) fn parts_in_block(plan: &FramePlan, ray: &PlanRay, span: Span, cell: UVec3) -> Vec<Part> {
+    match plan.index.at(cell) {
+        IndexEntry::Resident { level, .. } => divided(plan, ray, span, level, Some(cell)),
+        IndexEntry::Transparent { .. } => Vec::new(),
+    }
+}
+
+fn divided(plan: &FramePlan, ray: &PlanRay, span: Span, level: Level, cell: Option<UVec3>) -> Vec<Part> {
+    let nominal = plan.sampling.step_world() * f64::from(level.stride());
+    let uncut = segments(span, nominal * ray.stretch);
+    match plan.sampling.lengths() {
+        Lengths::True => uncut.filter_map(|s| cut(s, span, cell)).collect(),
+        Lengths::Nominal => uncut.filter(|s| is_inside(middle(s), span)).map(|s| whole(s, nominal, cell)).collect(),
     }
 }
 

@@ -84,10 +84,11 @@ impl<'a> Setup<'a> {
         let domain = whole(self.volume).intersection(&self.clip);
         let (index, bricks, visible) = cut(self);
         let sampling = Sampling::new(self.step_world, self.rule, self.mode).unwrap();
-        let sampling = sampling.placed(self.placement).unwrap().divided(self.division).weighted(self.lengths).unwrap();
+        let sampling = sampling.divided(self.division).weighted(self.lengths).unwrap();
+        let steps = Steps::of(&sampling, self.placement, Level(3)).unwrap();
         let mut plan = FramePlan {
             dims: grid.dims(),
-            rays: RayFrame::new(&self.camera, grid, self.size, &domain, &Steps::of(&sampling, Level(3))),
+            rays: RayFrame::new(&self.camera, grid, self.size, &domain, &steps),
             domain,
             visible: visible.intersection(&domain),
             sampling,

@@ -37,7 +37,7 @@ impl Beams {
     /// About 1 us a tile, over all threads of the current rayon pool.
     pub fn of(plan: &FramePlan, overview: &Overview) -> Option<Beams> {
         // Beams count segments of shells; bricks have segments of their own.
-        if plan.sampling.placement() != Placement::Shells || plan.sampling.division() == Division::Brick {
+        if plan.rays.placement != Placement::Shells || plan.sampling.division() == Division::Brick {
             return None;
         }
         // Between levels, what is dark need not be connected: a pre-integrated segment could cross something visible.

@@ -6,13 +6,13 @@ mod surfaces;
 
 use std::ops::Range;
 
-use brickfield_core::glam::{DVec2, UVec3};
+use brickfield_core::glam::UVec3;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use crate::{Division, FramePlan, IndexEntry, Lengths, Placement};
 use picture::Projector;
-use polygon::{area, grown};
+use polygon::area;
 use surfaces::{Outline, outlines};
 
 /// The polygons of a frame, brick by brick from back to front, clipped to their bricks and to the picture.
@@ -22,8 +22,9 @@ use surfaces::{Outline, outlines};
 /// brick are polygons, too, of the segments that end with the brick. So every segment of every ray is one fragment. (With
 /// [`Lengths::Nominal`] polygons are the segments' middles, and faces none.)
 ///
-/// Polygons are projected, and grown by an eighth of a pixel: which fragments count is decided by the shader from the ray, which
-/// knows exactly; rasterisers round corners to 1/256 of a pixel.
+/// Polygons are projected, and grown by an eighth of a pixel and by what f32 may put a ray beside its pixel
+/// ([`RayFrame::rounding`](crate::RayFrame::rounding)): which fragments count is decided by the shader from the ray; rasterisers round corners to 1/256 of a
+/// pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProxyGeometry {
     target: Target,
@@ -95,8 +96,6 @@ impl Target {
     }
 }
 
-/// By how many pixels polygons are grown.
-const GROWN: f64 = 0.125;
 /// Most fragments in a batch, about: what a device does at a time.
 const BATCH_FRAGMENTS: f64 = (1u32 << 24) as f64;
 
@@ -105,11 +104,11 @@ impl ProxyGeometry {
     ///
     /// Spheres have no polygons, nor have segments that do not end with their brick ([`Division::Ray`]): then there are none.
     ///
-    /// Cost: about 1 us a polygon, over all threads of the current rayon pool.
+    /// Cost: 1 to 2 us a polygon on two cores; all threads of the current rayon pool are used.
     pub fn of(plan: &FramePlan, back_to_front: &[UVec3], target: Target) -> ProxyGeometry {
-        let is_drawn = plan.sampling.placement() != Placement::Shells && plan.sampling.division() == Division::Brick;
+        let is_drawn = plan.rays.placement != Placement::Shells && plan.sampling.division() == Division::Brick;
         let back_to_front = if is_drawn { back_to_front } else { &[] };
-        let projector = Projector::new(&plan.rays, plan.sampling.step_world());
+        let projector = Projector::new(plan);
         let of_brick = |cell: &UVec3| outlines(plan, &projector, *cell);
         let outlines: Vec<Vec<Outline>> = back_to_front.par_iter().map(of_brick).collect();
         let word = |cell: UVec3| [cell.x, cell.y, cell.z, plan.index.at(cell).pack()];
@@ -141,15 +140,17 @@ impl ProxyGeometry {
 
     /// Adds a polygon as a fan of triangles; its area in pixels.
     fn push(&mut self, brick: u32, outline: &Outline) -> f64 {
-        let polygon: Vec<DVec2> = grown(&outline.points, GROWN);
-        let first = self.corners.len() as u32;
-        let Outline { surface, owner, .. } = *outline;
-        let corner = |p: &DVec2| ProxyCorner { pixel: p.as_vec2().to_array(), surface, brick, owner };
-        self.corners.extend(polygon.iter().map(corner));
-        let n = polygon.len() as u32;
+        let Outline { ref points, surface, owner } = *outline;
+        let (first, n) = (self.corners.len() as u32, points.len() as u32);
+        self.corners.extend(points.iter().map(|p| ProxyCorner {
+            pixel: p.as_vec2().to_array(),
+            surface,
+            brick,
+            owner,
+        }));
         self.indices.extend((1..n.saturating_sub(1)).flat_map(|i| [first, first + i, first + i + 1]));
         self.n_polygons += 1;
-        area(&polygon)
+        area(points)
     }
 
     /// What the polygons are blended into.

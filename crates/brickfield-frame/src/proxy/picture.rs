@@ -1,13 +1,15 @@
 //! From sample space to the picture.
 
-use brickfield_core::glam::{DMat3, DVec2, DVec3};
+use brickfield_core::glam::{DMat3, DVec2, DVec3, UVec2};
 
-use super::polygon::clip;
-use crate::RayFrame;
+use super::polygon::{clip, hull};
+use crate::{FramePlan, RayFrame};
 
 /// Nearer to the eye's plane than this share of a step, nothing is drawn: what a ray sees there is below rounding.
 const NEAR: f64 = 1e-9;
-/// Polygons are cut this many pixels beyond the picture's border.
+/// By how many pixels polygons are grown: more than rasterisers round.
+pub(super) const GROWN: f64 = 0.125;
+/// How many pixels around the picture belong to its window.
 const MARGIN: f64 = 1.0;
 
 /// Projects points relative to the frame's centre.
@@ -17,24 +19,38 @@ pub(super) struct Projector<'a> {
     /// The eye; for parallel rays the anchor of the picture's centre.
     origin: DVec3,
     near: f64,
+    /// How far f32 may put a ray's positions from where they are: in voxels; and as [`Projector::camera`] counts.
+    rounding: DVec3,
+    camera_rounding: DVec3,
 }
 
 impl<'a> Projector<'a> {
-    pub(super) fn new(rays: &'a RayFrame, step_world: f64) -> Projector<'a> {
+    pub(super) fn new(plan: &'a FramePlan) -> Projector<'a> {
+        let rays = &plan.rays;
         let [forward, right, down] = rays.direction;
         let is_parallel = rays.pixel == 0.0;
         let [right, down] = if is_parallel { [rays.anchor[1], rays.anchor[2]] } else { [right, down] };
+        let to_camera = DMat3::from_cols(right, down, forward).inverse();
+        let rounding = rounding(plan);
+        let [x, y, z] = [0, 1, 2].map(|axis| to_camera.row(axis).abs().dot(rounding));
         Projector {
             rays,
-            to_camera: DMat3::from_cols(right, down, forward).inverse(),
+            to_camera,
             origin: rays.anchor[0] - forward * rays.anchor_depth,
-            near: NEAR * step_world,
+            near: NEAR * plan.sampling.step_world(),
+            rounding,
+            camera_rounding: DVec3::new(x, y, z),
         }
     }
 
     /// The eye, if there is one.
     pub(super) fn eye(&self) -> Option<DVec3> {
         (self.rays.pixel != 0.0).then_some(self.origin)
+    }
+
+    /// How far f32 may put a ray's positions from where they are, in voxels.
+    pub(super) fn rounding(&self) -> DVec3 {
+        self.rounding
     }
 
     /// x and y in pixels from the picture's centre (perspective: times the depth), z the depth in world units past the
@@ -53,18 +69,67 @@ impl<'a> Projector<'a> {
         if self.rays.pixel == 0.0 { self.rays.anchor_past_start + self.rays.start } else { 0.0 }
     }
 
-    /// A polygon as it is seen in the picture, in pixels, cut a little beyond the border and before the eye.
-    pub(super) fn project(&self, polygon: &[DVec3]) -> Vec<DVec2> {
+    /// All of a window, in pixels, whose rays may meet a polygon: a little more than where it is seen. Nothing is behind the eye.
+    ///
+    /// A ray that f32 puts beside its pixel p by d meets the polygon in a point x that is seen at p + (d.xy - p d.z) / x.z. That is
+    /// affine in 1 / x.z, which is affine in the picture: the hull of what its corners may be off by has all of them.
+    pub(super) fn project(&self, polygon: &[DVec3], window: Window) -> Vec<DVec2> {
         let camera: Vec<DVec3> = polygon.iter().map(|p| self.camera(*p)).collect();
-        let half = 0.5 * self.rays.size.as_dvec2();
-        let flat: Vec<DVec2> = match self.rays.pixel {
-            0.0 => camera.iter().map(|c| c.truncate() + half).collect(),
-            _ => clip(&camera, |c| c.z - self.near).iter().map(|c| c.truncate() / c.z + half).collect(),
+        let (half, off) = (0.5 * self.rays.size.as_dvec2(), self.camera_rounding);
+        let squares: Vec<[DVec2; 2]> = match self.rays.pixel {
+            0.0 => camera.iter().map(|c| [c.truncate() + half, off.truncate() + GROWN]).collect(),
+            _ => {
+                let off = off.truncate() + half * off.z;
+                let before = clip(&camera, |c| c.z - self.near);
+                before.iter().map(|c| [c.truncate() / c.z + half, off / c.z + GROWN]).collect()
+            }
         };
-        let size = self.rays.size.as_dvec2();
-        let flat = clip(&flat, |p| p.x + MARGIN);
-        let flat = clip(&flat, |p| size.x + MARGIN - p.x);
-        let flat = clip(&flat, |p| p.y + MARGIN);
-        clip(&flat, |p| size.y + MARGIN - p.y)
+        let misses = |axis: usize| {
+            squares.iter().all(|[p, by]| p[axis] + by[axis] < window.low[axis])
+                || squares.iter().all(|[p, by]| p[axis] - by[axis] > window.high[axis])
+        };
+        if misses(0) || misses(1) {
+            return Vec::new();
+        }
+        let grown = hull(squares.iter().flat_map(|[p, by]| SQUARE.map(|corner| *p + *by * corner)).collect());
+        (0..2).fold(grown, |grown, axis| {
+            let grown = clip(&grown, |p| p[axis] - window.low[axis]);
+            clip(&grown, |p| window.high[axis] - p[axis])
+        })
     }
+
+    /// The picture, and a little around it.
+    pub(super) fn window(&self) -> Window {
+        Window { low: DVec2::splat(-MARGIN), high: self.rays.size.as_dvec2() + MARGIN }
+    }
+}
+
+/// A rectangle of the picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Window {
+    pub(super) low: DVec2,
+    pub(super) high: DVec2,
+}
+
+impl Window {
+    /// The part of it that may have fragments of a triangle: the rectangle around that, and a little more.
+    pub(super) fn around(self, [a, b, c]: [DVec2; 3]) -> Window {
+        Window { low: self.low.max(a.min(b).min(c) - GROWN), high: self.high.min(a.max(b).max(c) + GROWN) }
+    }
+}
+
+/// The corners of a square of side 2.
+const SQUARE: [DVec2; 4] = [DVec2::new(1.0, -1.0), DVec2::new(1.0, 1.0), DVec2::new(-1.0, 1.0), DVec2::new(-1.0, -1.0)];
+
+/// How far f32 may put the positions of any ray in the domain, in voxels: anchors are affine in the picture, so that no ray's
+/// terms are larger than those of the corners'.
+fn rounding(plan: &FramePlan) -> DVec3 {
+    let (rays, last) = (&plan.rays, plan.rays.size - 1);
+    let pixels = [UVec2::ZERO, last, UVec2::new(last.x, 0), UVec2::new(0, last.y), rays.size / 2];
+    let of = |pixel: UVec2| {
+        let ray = rays.ray(pixel.x, pixel.y);
+        let way = (0.5 * plan.domain.diagonal() + ray.anchor.length()) / ray.direction.length();
+        rays.rounding(&ray, ray.t_anchor.abs() + way)
+    };
+    pixels.map(of).into_iter().fold(DVec3::ZERO, DVec3::max)
 }

@@ -3,12 +3,12 @@
 use brickfield_core::Aabb;
 use brickfield_core::glam::{DVec2, DVec3, UVec3};
 
-use super::picture::Projector;
+use super::picture::{GROWN, Projector};
 use super::polygon::{Plane, clip, face, slice};
 use super::{IndexEntry, Lengths, ProxyCorner};
 use crate::{FramePlan, Placement};
 
-/// A polygon in the picture, not grown yet.
+/// A polygon in the picture.
 pub(super) struct Outline {
     pub(super) points: Vec<DVec2>,
     pub(super) surface: f32,
@@ -49,8 +49,10 @@ pub(super) fn outlines(plan: &FramePlan, projector: &Projector<'_>, cell: UVec3)
         Lengths::True => exits(plan, projector, &b),
         Lengths::Nominal => Vec::new(),
     };
+    // f32 may put a surface into the brick that lies beside it.
+    let near = Aabb { min: b.min - projector.rounding(), max: b.max + projector.rounding() };
     for stack in stacks(plan, projector, &b) {
-        outlines.extend(stack.outlines(plan, projector, &b, step));
+        outlines.extend(stack.outlines(plan, projector, &near, step));
     }
     outlines.retain(|o| !o.points.is_empty());
     outlines
@@ -59,12 +61,13 @@ pub(super) fn outlines(plan: &FramePlan, projector: &Projector<'_>, cell: UVec3)
 /// The faces through which rays leave a box.
 fn exits(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Outline> {
     let forward = plan.rays.direction[0];
-    let leaves_up = |axis: usize| projector.eye().map_or(forward[axis] > 0.0, |eye| eye[axis] < b.max[axis]);
-    let leaves_down = |axis: usize| projector.eye().map_or(forward[axis] < 0.0, |eye| eye[axis] > b.min[axis]);
+    let off = projector.rounding();
+    let leaves_up = |axis: usize| projector.eye().map_or(forward[axis] > 0.0, |e| e[axis] < b.max[axis] + off[axis]);
+    let leaves_down = |axis: usize| projector.eye().map_or(forward[axis] < 0.0, |e| e[axis] > b.min[axis] - off[axis]);
     let up = (0..3).filter(|axis| leaves_up(*axis)).map(|axis| (2 * axis + 1, face(b, axis, b.max[axis])));
     let down = (0..3).filter(|axis| leaves_down(*axis)).map(|axis| (2 * axis, face(b, axis, b.min[axis])));
     let outline = |(owner, polygon): (usize, Vec<DVec3>)| Outline {
-        points: projector.project(&polygon),
+        points: projector.project(&polygon, projector.window()),
         surface: ProxyCorner::EXIT,
         owner: owner as u32,
     };
@@ -73,7 +76,7 @@ fn exits(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Outline> 
 
 /// The stacks of planes that rays through a box may meet.
 fn stacks(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Stack> {
-    match plan.sampling.placement() {
+    match plan.rays.placement {
         Placement::Shells => Vec::new(),
         Placement::ViewportPlanes => vec![picture_plane(plan, projector, DVec3::Z, 0, Part::All)],
         Placement::TessellatedShells { .. } => facets_over(plan, projector, b),
@@ -93,7 +96,7 @@ fn picture_plane(plan: &FramePlan, projector: &Projector<'_>, normal: DVec3, own
 fn facets_over(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Stack> {
     let rays = &plan.rays;
     let faces = (0..3).flat_map(|axis| [face(b, axis, b.min[axis]), face(b, axis, b.max[axis])]);
-    let seen: Vec<DVec2> = faces.flat_map(|polygon| projector.project(&polygon)).collect();
+    let seen: Vec<DVec2> = faces.flat_map(|polygon| projector.project(&polygon, projector.window())).collect();
     let (Some(low), Some(high)) = (seen.iter().copied().reduce(DVec2::min), seen.iter().copied().reduce(DVec2::max))
     else {
         return Vec::new();
@@ -156,13 +159,14 @@ impl Stack {
     fn seen(&self, plan: &FramePlan, projector: &Projector<'_>, b: &Aabb, level: f64) -> Vec<DVec2> {
         let polygon = slice(b, Plane { gradient: self.gradient, level: level - self.offset });
         let polygon = match self.part {
-            Part::Pyramid { axis, eye } => in_pyramid(plan, polygon, axis, eye),
+            Part::Pyramid { axis, eye } => in_pyramid(plan, polygon, axis, eye, projector.rounding()),
             _ => polygon,
         };
-        let seen = projector.project(&polygon);
         match self.part {
-            Part::Facet(triangle) => in_triangle(seen, triangle),
-            _ => seen,
+            Part::Facet(triangle) => {
+                in_triangle(projector.project(&polygon, projector.window().around(triangle)), triangle)
+            }
+            _ => projector.project(&polygon, projector.window()),
         }
     }
 }
@@ -182,21 +186,22 @@ impl Part {
 }
 
 /// The part of a polygon in a plane across an axis that is seen at a smaller angle to it than to the other two.
-fn in_pyramid(plan: &FramePlan, polygon: Vec<DVec3>, axis: usize, eye: DVec3) -> Vec<DVec3> {
+fn in_pyramid(plan: &FramePlan, polygon: Vec<DVec3>, axis: usize, eye: DVec3, off: DVec3) -> Vec<DVec3> {
     let Some(first) = polygon.first() else { return polygon };
     let world = plan.rays.planes.voxel_world;
     let height = (first[axis] - eye[axis]).abs() * world[axis] * PYRAMID_MARGIN;
     [(axis + 1) % 3, (axis + 2) % 3].into_iter().fold(polygon, |polygon, other| {
-        let reach = height / world[other];
+        let reach = height / world[other] + 2.0 * off[other];
         let polygon = clip(&polygon, |p| p[other] - (eye[other] - reach));
         clip(&polygon, |p| eye[other] + reach - p[other])
     })
 }
 
-/// The part of a polygon of the picture that lies in a triangle.
+/// The part of a polygon of the picture that lies in a triangle, or beside it by no more than polygons are grown.
 fn in_triangle(polygon: Vec<DVec2>, [a, b, c]: [DVec2; 3]) -> Vec<DVec2> {
     let side = (b - a).perp_dot(c - a).signum();
-    [(a, b), (b, c), (c, a)]
-        .into_iter()
-        .fold(polygon, |polygon, (from, to)| clip(&polygon, |p| side * (to - from).perp_dot(p - from)))
+    [(a, b), (b, c), (c, a)].into_iter().fold(polygon, |polygon, (from, to)| {
+        let along = to - from;
+        clip(&polygon, |p| side * along.perp_dot(p - from) + GROWN * along.length())
+    })
 }

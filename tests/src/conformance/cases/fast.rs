@@ -1,7 +1,8 @@
 //! Fast mode: hardware filtering and rays that end early, within the bound of the device's filter.
 
+use brickfield::Technique;
 use brickfield::bricks::Downsampling;
-use brickfield::frame::Mode;
+use brickfield::frame::{Division, Lengths, Mode, Placement, Target};
 use brickfield::lod::Criterion;
 use brickfield_core::ScalarType;
 use brickfield_core::glam::{DVec3, UVec3};
@@ -44,6 +45,19 @@ pub(super) fn cases() -> Vec<Case> {
         }),
         picture("fast/gauss2", catches![IndexSwapped, RowsFlipped, shader::HALF_TEXEL], move || {
             fast(hills_of(ScalarType::U16).rule(QuadratureRule::Gauss2))
+        }),
+        picture("fast/bricks", catches![IndexSwapped, RowsFlipped, shader::HALF_TEXEL], move || {
+            fast(hills_of(ScalarType::U16)).with(|s| s.division = Division::Brick)
+        }),
+        picture("fast/nominal-planes", catches![IndexSwapped, RowsFlipped, shader::HALF_TEXEL], move || {
+            fast(hills_of(ScalarType::U8))
+                .with(|s| (s.placement, s.lengths) = (Placement::ViewportPlanes, Lengths::Nominal))
+        }),
+        picture("fast/polygons", catches![PolygonsReversed, RowsFlipped, shader::HALF_TEXEL], move || {
+            fast(hills_of(ScalarType::U8)).with(|s| {
+                (s.placement, s.division) = (Placement::ObjectPlanes, Division::Brick);
+                s.technique = Technique::Polygons(Target::Float32);
+            })
         }),
         picture("fast/preintegrated", catches![IndexSwapped, RowsFlipped, shader::HALF_TEXEL], move || {
             fast(hills_of(ScalarType::U16).rule(QuadratureRule::PreIntegrated))

@@ -4,7 +4,7 @@ use brickfield::bricks::Downsampling;
 use brickfield::frame::{Division, Lengths, Placement};
 use brickfield::lod::Criterion;
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Grid, ScalarType, TransferFunction, Volume};
+use brickfield_core::{Grid, ScalarType, TransferFunction, Volume, WorldPos};
 use brickfield_optics::QuadratureRule;
 
 use super::fields::{WARM, checkers, grid, hills, skew_grid, soft, sparse};
@@ -162,8 +162,45 @@ fn extremes() -> Vec<Case> {
                 .with(|s| s.division = Division::Brick)
         })
     };
+    // Finer above y = 30.5 than below.
+    let mixed = |placement| {
+        let finer = Criterion::DistanceFrom { point: WorldPos(DVec3::new(50.0, 45.0, 45.0)), factor: 1.0 };
+        placed(large(), soft(ScalarType::U16), placement)
+            .detail(finer, Downsampling::Subsample)
+            .with(|s| s.division = Division::Brick)
+    };
+    let in_a_face = |(placement, _): (Placement, _)| {
+        let name = format!("bricks/rays-in-a-face-{}", placement.name());
+        picture(name, catches![ExtinctionScaled], move || {
+            // Below it by less than f32 can tell.
+            let y = 30.5 - 1e-9;
+            mixed(placement).lens(DVec3::new(-3.0, y, 26.0), DVec3::new(35.0, y, 26.0), 1.1).odd()
+        })
+    };
+    let wide = |(placement, _): (Placement, _)| {
+        let name = format!("placement/very-wide-{}", placement.name());
+        picture(name, catches![ExtinctionScaled, AnchorHalfVoxel], move || {
+            let eye = DVec3::new(21.3, 20.2, 17.9);
+            placed(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), placement).lens(
+                eye,
+                eye + DVec3::new(5.0, -2.0, 1.0),
+                179.9f64.to_radians(),
+            )
+        })
+    };
+    let one_step = |(placement, _): (Placement, _)| {
+        let name = format!("placement/one-step-{}", placement.name());
+        picture(name, catches![ExtinctionScaled], move || {
+            placed(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), placement).step(3e7)
+        })
+    };
     let all = || PLACEMENTS.into_iter();
     let both = [Division::Ray, Division::Brick].into_iter();
     let long = both.flat_map(|division| PLACEMENTS.map(|(placement, _)| (placement, division))).map(long);
-    long.chain(all().map(far)).chain(all().map(constant)).collect()
+    long.chain(all().map(far))
+        .chain(all().map(constant))
+        .chain(all().map(in_a_face))
+        .chain(all().map(wide))
+        .chain(all().map(one_step))
+        .collect()
 }

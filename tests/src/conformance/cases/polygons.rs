@@ -4,8 +4,8 @@ use brickfield::Technique;
 use brickfield::bricks::Downsampling;
 use brickfield::frame::{Division, Lengths, Placement, Target};
 use brickfield::lod::Criterion;
-use brickfield_core::glam::DVec3;
-use brickfield_core::{Grid, ScalarType, TransferFunction, Volume};
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{Grid, ScalarType, TransferFunction, Volume, WorldPos};
 use brickfield_optics::QuadratureRule;
 
 use super::fields::{WARM, checkers, grid, hills, skew_grid, soft};
@@ -18,7 +18,7 @@ const FACETS: Placement = Placement::TessellatedShells { facet_pixels: 12 };
 const PLACEMENTS: [Placement; 3] = [FACETS, Placement::ViewportPlanes, Placement::ObjectPlanes];
 
 pub(super) fn cases() -> Vec<Case> {
-    [plain(), levels(), rules(), views(), nominal(), targets(), stiff()].into_iter().flatten().collect()
+    [plain(), levels(), rules(), views(), degenerate(), nominal(), targets(), stiff()].into_iter().flatten().collect()
 }
 
 fn large() -> Volume {
@@ -101,6 +101,43 @@ fn views() -> Vec<Case> {
     cases.push(picture("polygons/three-stacks", catches![StackMissing, shader::STACK_FLAT], move || {
         wide(Placement::ObjectPlanes)
     }));
+    cases
+}
+
+/// Where rounding decides which brick a ray is in, whether a surface lies in it, or which pixels a polygon covers.
+fn degenerate() -> Vec<Case> {
+    let thirds = || {
+        let grid = Grid::axis_aligned(UVec3::new(71, 66, 53), DVec3::splat(1.0 / 3.0)).expect("a grid");
+        hills(&grid, ScalarType::U16)
+    };
+    let center = DVec3::new(35.0, 33.0, 26.0);
+    // Finer above y = 30.5 than below.
+    let mixed = |p| {
+        let finer = Criterion::DistanceFrom { point: WorldPos(DVec3::new(50.0, 45.0, 45.0)), factor: 1.0 };
+        polygons(large(), soft(ScalarType::U16), p).detail(finer, Downsampling::Subsample)
+    };
+    // Faces of bricks are at 15.5 + 15 i, 100 steps and their multiples from the eye.
+    let on_faces = move |p| {
+        let eye = DVec3::new(15.5 - 100.0, 33.0, 26.0) / 3.0;
+        polygons(thirds(), soft(ScalarType::U16), p).lens(eye, DVec3::new(35.0, 33.0, 26.0) / 3.0, 0.5).step(1.0)
+    };
+    let on_faces_parallel = move |p| polygons(thirds(), soft(ScalarType::U16), p).parallel(DVec3::X, 24.0).step(1.0);
+    // Below it by less than f32 can tell.
+    let along_x = move |p, y, z| mixed(p).lens(DVec3::new(-3.0, y, z), DVec3::new(35.0, y, z), 1.1).odd();
+    let in_a_face = move |p| along_x(p, 30.5 - 1e-9, 26.0);
+    let in_two_faces = move |p| along_x(p, 30.5 - 1e-9, 30.5 - 1e-9);
+    let magnified =
+        move |p| polygons(large(), soft(ScalarType::U16), p).lens(DVec3::new(-40.0, -70.0, 41.0), center, 2e-5);
+    let eye_in_a_corner = move |p| mixed(p).eye(DVec3::splat(30.5) + 1e-5, center + 20.0);
+    let steps = |p| polygons(large(), soft(ScalarType::U16), p).step(3e7);
+    let both = || catches![PolygonsReversed, ExitsMissing];
+    let mut cases = each("surfaces-on-faces", both(), on_faces);
+    cases.extend(each("surfaces-on-faces-parallel", both(), on_faces_parallel));
+    cases.extend(each("rays-in-a-face", both(), in_a_face));
+    cases.extend(each("rays-in-two-faces", both(), in_two_faces));
+    cases.extend(each("magnified", both(), magnified));
+    cases.extend(each("eye-in-a-corner", both(), eye_in_a_corner));
+    cases.extend(each("one-step", catches![ExitsMissing], steps));
     cases
 }
 

@@ -98,6 +98,11 @@ impl Setup {
         self.with(|s| s.camera = camera)
     }
 
+    /// An odd number of pixels along both sides: the ray of the middle one runs along the view direction.
+    pub(super) fn odd(self) -> Setup {
+        self.with(|s| s.size = PICTURE + 1)
+    }
+
     /// Parallel rays in `direction` through the volume's centre; the picture is `height` world units high.
     pub(super) fn parallel(self, direction: DVec3, height: f64) -> Setup {
         let center = self.volume.grid().world_box().center();
