@@ -69,9 +69,14 @@ fn f32_is_within_tolerance_of_f64() {
                 let off = difference(*a, *b) - expected.ambiguity[i];
                 assert!(off < 2e-5, "{placement:?} {division:?} {lengths:?} {camera:?}, pixel {i}: {off:e}");
             }
-            // Nominal lengths may have a whole layer of middles on bricks' faces.
+            // Parallel rays along an axis meet a whole layer of middles on bricks' faces at once.
+            let is_parallel = matches!(camera.projection(), Projection::Orthographic { .. });
+            let has_layers = is_parallel && division == Division::Brick && placement != Placement::ObjectPlanes;
             let ambiguous = expected.ambiguity.iter().filter(|a| **a > 1e-4).count();
-            let most = expected.ambiguity.len() / if lengths == Lengths::True { 20 } else { 1 };
+            let most = match lengths {
+                Lengths::Nominal if has_layers => expected.ambiguity.len(),
+                _ => expected.ambiguity.len() / 100,
+            };
             assert!(ambiguous <= most, "{placement:?} {division:?} {lengths:?}: {ambiguous}");
         });
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use brickfield_bricks::BrickTree;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
-use brickfield_core::{Aabb, BrickId, Level, ValueRange};
+use brickfield_core::{Aabb, BrickId, BrickLayout, Level, ValueRange};
 use brickfield_frame::{
     Beams, Division, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, Placement, PlacementError,
     ProxyGeometry, RayFrame, Sampling, SamplingError, Steps,
@@ -34,6 +34,10 @@ pub enum PrepareError {
     TooManySegments { n_segments: f64, limit: u32 },
     #[error("{n_bricks} bricks; an index tells at most {limit} apart: take larger bricks or a coarser level")]
     TooManyBricks { n_bricks: usize, limit: u32 },
+    #[error(
+        "a selection of bricks of {} in {} samples, for an octree of bricks of {} in {}", selected.1, selected.0, own.1, own.0
+    )]
+    ForeignSelection { selected: (UVec3, u32), own: (UVec3, u32) },
     #[error("polygons of spherical shells: a sphere has none; take tessellated shells")]
     RoundPolygons,
     #[error("polygons of whole rays: they are clipped to bricks; divide bricks")]
@@ -59,7 +63,8 @@ pub const MAX_POLYGONS: u32 = 1 << 22;
 /// Most segments on a ray: an f32 counts them exactly.
 pub const MAX_SEGMENTS: u32 = 1 << 24;
 
-/// The plan of a frame: selects a cut, drops what the transfer function and the view make invisible, gathers the rest.
+/// The plan of a frame: selects the cut that the scene's criteria ask for, drops what the transfer function and the view make
+/// invisible, gathers the rest.
 ///
 /// `residency` carries the bricks from frame to frame.
 ///
@@ -67,8 +72,24 @@ pub const MAX_SEGMENTS: u32 = 1 << 24;
 /// A picture size, step, clip box, data value or number of bricks out of range.
 pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Result<FramePlan, PrepareError> {
     check_size(scene.size)?;
+    prepare_selection(tree, scene, &select_cut(tree.layout(), tree.grid(), &scene.view(), &scene.detail), residency)
+}
+
+/// The plan of a frame of bricks that were selected before, by filters of one's own for example
+/// ([`select_by`](brickfield_lod::select_by)); the scene's criteria are not asked.
+///
+/// # Errors
+/// As [`prepare`], and a selection of another octree.
+pub fn prepare_selection(
+    tree: &BrickTree,
+    scene: &Scene,
+    selection: &Selection,
+    residency: &mut Residency,
+) -> Result<FramePlan, PrepareError> {
+    check_size(scene.size)?;
     check_values(tree)?;
     check_technique(scene)?;
+    check_layout(tree, selection)?;
     let grid = tree.grid();
     let domain = clipped_domain(tree, scene.clip)?;
     let step_world = scene.step_voxels * grid.spacing().min_element();
@@ -78,12 +99,11 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
     let sampling = Sampling::new(step_world, scene.rule, scene.mode)?;
     let sampling = sampling.divided(scene.division).weighted(scene.lengths)?;
     check_segments(grid.world_box().diagonal() / step_world)?;
-    let selection = select_cut(tree.layout(), grid, &scene.view(), &scene.detail);
     let coarsest = selection.drawn().map(|id| id.level).max().unwrap_or(Level(0));
     let steps = Steps::of(&sampling, scene.placement, coarsest)?;
     let rays = RayFrame::new(&scene.camera, grid, scene.size, &volume_box(tree), &steps);
     check_segments(rays.n_segments)?;
-    let resident = resident_bricks(tree, scene, &selection, &domain);
+    let resident = resident_bricks(tree, scene, selection, &domain);
     if resident.len() >= IndexEntry::MAX_SLOTS as usize {
         return Err(PrepareError::TooManyBricks { n_bricks: resident.len(), limit: IndexEntry::MAX_SLOTS });
     }
@@ -159,6 +179,15 @@ fn check_polygons(tree: &BrickTree, rays: &RayFrame, step_world: f64, n_bricks: 
         return Ok(());
     }
     Err(PrepareError::TooManyPolygons { n_polygons, limit: MAX_POLYGONS })
+}
+
+fn check_layout(tree: &BrickTree, selection: &Selection) -> Result<(), PrepareError> {
+    let (selected, own) = (selection.cut().layout(), tree.layout());
+    if selected == own {
+        return Ok(());
+    }
+    let of = |layout: &BrickLayout| (layout.dims(), layout.side().n_samples());
+    Err(PrepareError::ForeignSelection { selected: of(selected), own: of(own) })
 }
 
 fn check_size(size: UVec2) -> Result<(), PrepareError> {
@@ -325,6 +354,26 @@ mod tests {
         };
         assert!(plan(1e6).is_ok());
         assert!(matches!(plan(1e30), Err(PrepareError::TooManySegments { .. })), "{:?}", plan(1e30).err());
+    }
+
+    #[test]
+    fn a_selection_of_another_octree_is_refused() {
+        let tree = |n: u32| {
+            let grid = Grid::axis_aligned(UVec3::splat(n), DVec3::ONE).unwrap();
+            let volume = Volume::new(grid, vec![1u8; grid.n_voxels()]).unwrap();
+            build_tree(&volume, &BuildOptions::default()).unwrap()
+        };
+        let (tree, other) = (tree(64), tree(65));
+        let camera = Camera::framing(&tree.grid().world_box(), DVec3::X, DVec3::Z).unwrap();
+        let scene = Scene::new(camera, UVec2::new(4, 4), TransferFunction::constant(0.1, [1.0; 3]).unwrap());
+        let of = |of: &BrickTree| select_cut(of.layout(), of.grid(), &scene.view(), &scene.detail);
+        let plan = |selection| prepare_selection(&tree, &scene, &selection, &mut Residency::default());
+        assert!(plan(of(&tree)).is_ok());
+        let refused = plan(of(&other)).unwrap_err().to_string();
+        assert!(
+            refused.contains("in [65, 65, 65] samples, for an octree") && refused.contains("in [64, 64, 64]"),
+            "{refused}"
+        );
     }
 
     #[test]

@@ -29,9 +29,10 @@ fn of_paper() -> ExitCode {
     match lamar(&args) {
         Ok(findings) => {
             for missed in &findings.missed {
-                eprintln!("compare: missed: {missed}");
+                eprintln!("compare: missed: {}", missed.what);
             }
-            ExitCode::from(if args.check && !findings.missed.is_empty() { 4 } else { 0 })
+            let fails = findings.missed.iter().any(|missed| args.check.contains(&missed.claim));
+            ExitCode::from(if fails { 4 } else { 0 })
         }
         Err(e) => {
             eprintln!("compare: {e}");

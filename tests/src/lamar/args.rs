@@ -18,7 +18,7 @@ pub struct LamarArgs {
     /// The paper
     #[arg(long, value_enum)]
     pub paper: Paper,
-    /// What is run: selection, table, downsampling and memory unless stated
+    /// What is run: all that the paper has (everything but views) unless stated
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     pub part: Vec<Part>,
     /// The folder of real volumes
@@ -55,9 +55,9 @@ pub struct LamarArgs {
     /// Backends without which the comparison fails (status 3)
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub require: Vec<BackendKind>,
-    /// Fail (status 4) if something that is claimed does not hold
-    #[arg(long)]
-    pub check: bool,
+    /// Fail (status 4) if something that is claimed does not hold: of pictures, of times, or both
+    #[arg(long, value_enum, value_name = "CLAIMS", value_delimiter = ',', require_equals = true, num_args = 0.., default_missing_values = ["pictures", "times"])]
+    pub check: Vec<Claim>,
     /// Folder that receives tables as JSON, and pictures
     #[arg(long, value_name = "DIR", default_value = "target/lamar")]
     pub out: PathBuf,
@@ -74,6 +74,15 @@ pub struct LamarArgs {
 pub enum Paper {
     /// LaMar, Hamann and Joy 1999: multiresolution techniques for interactive texture-based volume visualization.
     Lamar,
+}
+
+/// What is claimed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Claim {
+    /// What pictures and cuts are like: the same on every machine.
+    Pictures,
+    /// What is faster.
+    Times,
 }
 
 /// What can be run.
@@ -116,10 +125,11 @@ impl Part {
 impl LamarArgs {
     /// The parts to be run, each once.
     pub fn parts(&self) -> Vec<Part> {
-        if self.part.is_empty() {
-            return vec![Part::Selection, Part::Table, Part::Downsampling, Part::Memory];
+        let all = Part::value_variants().iter().copied();
+        match self.part.is_empty() {
+            true => all.filter(|part| *part != Part::Views).collect(),
+            false => all.filter(|part| self.part.contains(part)).collect(),
         }
-        Part::value_variants().iter().copied().filter(|part| self.part.contains(part)).collect()
     }
 }
 
@@ -130,10 +140,11 @@ mod tests {
     #[test]
     fn parts_come_once_in_their_order() {
         let parse = |words: &str| LamarArgs::try_parse_from(words.split_whitespace()).unwrap();
-        assert_eq!(
-            parse("compare --paper lamar").parts(),
-            [Part::Selection, Part::Table, Part::Downsampling, Part::Memory]
-        );
+        let of_the_paper = parse("compare --paper lamar");
+        assert_eq!(of_the_paper.parts().len(), Part::value_variants().len() - 1);
+        assert!(!of_the_paper.parts().contains(&Part::Views) && of_the_paper.check.is_empty());
+        assert_eq!(parse("compare --paper lamar --check --frames 1").check, [Claim::Pictures, Claim::Times]);
+        assert_eq!(parse("compare --paper lamar --check=pictures").check, [Claim::Pictures]);
         let some = parse("compare --paper lamar --part views,seams,views");
         assert_eq!(some.parts(), [Part::Seams, Part::Views]);
         assert_eq!((some.size, some.views, some.volume_side), (UVec2::splat(192), 20, 512));

@@ -6,9 +6,9 @@ use brickfield_core::BrickSide;
 
 use super::measure::{Contestant, answer, distance};
 use super::scenes::{exhibits, geometries, scene, tree, views};
-use super::{LamarArgs, LamarError, print};
+use super::{LamarArgs, LamarError, Missed, print};
 
-pub(super) fn run(args: &LamarArgs) -> Result<Vec<String>, LamarError> {
+pub(super) fn run(args: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
     print("Bricks of 16, ray caster on the cpu, errors against the continuous integral at full resolution.\n")?;
     print("data               view      RMSE: subsampled  averaged   colour difference: subsampled  averaged  better")?;
     let mut cpu = brickfield::cpu::CpuBackend::new();

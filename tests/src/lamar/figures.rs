@@ -10,7 +10,7 @@ use brickfield_core::{BrickId, BrickSide, Camera, Image};
 
 use super::scenes::{Exhibit, Geometry, exhibits, geometries, geometries_of, scene, tree, views};
 use super::seams::{camera as cube_camera, cube};
-use super::{LamarArgs, LamarError, print};
+use super::{LamarArgs, LamarError, Missed, print};
 use crate::compare::rivals::Rivals;
 
 /// Behind transparent pixels.
@@ -18,7 +18,7 @@ const BACKGROUND: [f64; 3] = [0.02, 0.02, 0.025];
 /// Bricks' side in figure 14: the paper's.
 const SIDE: BrickSide = BrickSide::S16;
 
-pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, LamarError> {
+pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, LamarError> {
     // For looking, larger than for timing.
     let args = &LamarArgs { size: args.size * 2, ..args.clone() };
     // The last is a rasteriser, if there is one.

@@ -95,17 +95,26 @@ impl<'a> Contestant<'a> {
     pub(super) fn prepare_spread(&self) -> Spread {
         spread(&self.prepare_ms)
     }
+}
 
-    /// Whether a picture is within the rule of its plan's f64 reference; why not, if it is not.
-    pub(super) fn judge(
-        &mut self,
-        image: &Image<f32>,
-        reference: &Discrete,
-        backend: &dyn Backend,
-    ) -> Result<Option<String>, LamarError> {
-        let plan = prepare(self.tree, self.scene, &mut self.residency)?;
-        let tolerance = Tolerance::of(&plan, reference, &backend.describe().capabilities)?;
-        Ok(tolerance.judge(image, &reference.image).complaint.map(|c| c.to_string()))
+/// The sum that a scene's cut asks for, and how far a picture of it may be off.
+pub(super) struct Judge {
+    reference: Discrete,
+    tolerance: Tolerance,
+}
+
+impl Judge {
+    /// For a scene in exact mode, of which the rule is the same on every device.
+    pub(super) fn new(tree: &BrickTree, scene: &Scene, backend: &dyn Backend) -> Result<Judge, LamarError> {
+        let reference = reference(tree, scene)?;
+        let plan = prepare(tree, scene, &mut Residency::default())?;
+        let tolerance = Tolerance::of(&plan, &reference, &backend.describe().capabilities)?;
+        Ok(Judge { reference, tolerance })
+    }
+
+    /// Why a picture is not within the rule, if it is not.
+    pub(super) fn complaint(&self, image: &Image<f32>) -> Option<String> {
+        self.tolerance.judge(image, &self.reference.image).complaint.map(|c| c.to_string())
     }
 }
 

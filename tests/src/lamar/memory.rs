@@ -4,9 +4,9 @@ use brickfield::bricks::tree_memory;
 use brickfield_core::{BrickLayout, Level};
 
 use super::scenes::{exhibits, sides};
-use super::{LamarArgs, LamarError, print};
+use super::{LamarArgs, LamarError, Missed, print};
 
-pub(super) fn run(args: &LamarArgs) -> Result<Vec<String>, LamarError> {
+pub(super) fn run(args: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
     print(
         "The formula: of a brick's n^3 voxels, n^3 - (n - 1)^3 are shared. Stored: level 0 in whole bricks; with the coarser\n\
            levels; of what is stored, voxels once, again in a neighbour, and beyond the volume's border.\n",

@@ -19,7 +19,7 @@ mod shells;
 mod table;
 mod views;
 
-pub use args::{LamarArgs, Part};
+pub use args::{Claim, LamarArgs, Part};
 pub use error::LamarError;
 
 use crate::compare::rivals::Rivals;
@@ -28,8 +28,27 @@ use crate::compare::say;
 /// What came of the parts that were asked for.
 #[derive(Clone, Debug, Default)]
 pub struct Findings {
+    /// What does not hold.
+    pub missed: Vec<Missed>,
+}
+
+/// A claim that does not hold.
+#[derive(Clone, Debug)]
+pub struct Missed {
+    /// What it is about.
+    pub claim: Claim,
     /// What does not hold, in words.
-    pub missed: Vec<String>,
+    pub what: String,
+}
+
+impl Missed {
+    fn of_pictures(what: String) -> Missed {
+        Missed { claim: Claim::Pictures, what }
+    }
+
+    fn of_times(what: String) -> Missed {
+        Missed { claim: Claim::Times, what }
+    }
 }
 
 /// Runs the parts that `args` ask for, and prints what they find.

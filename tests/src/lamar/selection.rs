@@ -6,11 +6,11 @@ use brickfield::lod::{Criterion, Culling, Selection, View, select_cut};
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickLayout, BrickSide, Camera, Grid, Projection, WorldPos};
 
-use super::{LamarArgs, LamarError, print};
+use super::{LamarArgs, LamarError, Missed, print};
 
 const SIDE: BrickSide = BrickSide::S16;
 
-pub(super) fn run(_: &LamarArgs) -> Result<Vec<String>, LamarError> {
+pub(super) fn run(_: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
     print(
         "Figure 4: eight tiles in four levels; a tile is drawn if the point is farther from its centre than its width.\n\
            Tiles of each level, finest first, by the place of the point in tiles:\n",
@@ -22,7 +22,7 @@ pub(super) fn run(_: &LamarArgs) -> Result<Vec<String>, LamarError> {
             let n = select(UVec3::new(8, 0, 0), DVec3::X * point)?.n_drawn_per_level();
             print(&format!("  {point:.2}: {n:?}, {} in all", n.iter().sum::<usize>()))?;
             if n != by_hand {
-                missed.push(format!("figure 4: {n:?} tiles at {point}, by hand {by_hand:?}"));
+                missed.push(Missed::of_pictures(format!("figure 4: {n:?} tiles at {point}, by hand {by_hand:?}")));
             }
         }
     }
@@ -40,7 +40,10 @@ pub(super) fn run(_: &LamarArgs) -> Result<Vec<String>, LamarError> {
         words.join(", ")
     ))?;
     if (least, most) != (13, 61) || !counts.contains_key(&49) {
-        missed.push(format!("figure 5: {least} to {most} tiles, 49 among them: {}", counts.contains_key(&49)));
+        missed.push(Missed::of_pictures(format!(
+            "figure 5: {least} to {most} tiles, 49 among them: {}",
+            counts.contains_key(&49)
+        )));
     }
     Ok(missed)
 }

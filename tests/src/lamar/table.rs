@@ -2,15 +2,14 @@
 
 use brickfield::Scene;
 use brickfield::bricks::{BrickTree, Downsampling};
-use brickfield::cpu::Discrete;
 use brickfield::frame::Backend;
 use brickfield::lod::Criterion;
 use brickfield_core::{Camera, Image};
 use serde::Serialize;
 
-use super::measure::{Contestant, Distance, Drawn, Spread, answer, distance, reference};
+use super::measure::{Contestant, Distance, Drawn, Judge, Spread, answer, distance};
 use super::scenes::{Exhibit, Geometry, exhibits, geometries, geometries_of, scene, sides, tree, views};
-use super::{LamarArgs, LamarError, print};
+use super::{LamarArgs, LamarError, Missed, print};
 use crate::compare::rivals::Rivals;
 
 /// A line of the table: one data set, view, tile size, geometry and backend.
@@ -48,7 +47,7 @@ struct Seat<'a> {
     answer: &'a Image<f64>,
 }
 
-pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, LamarError> {
+pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, LamarError> {
     print(&format!(
         "{} x {} pixels, steps of {} voxel(s) of level 0, 2^level of them in coarser bricks (subsampled); times are medians of {} frames from the\n\
          scene to the picture (selection, order and polygons included, bricks resident); errors are against the continuous integral\n\
@@ -86,12 +85,12 @@ fn of_seat(args: &LamarArgs, rivals: &mut Rivals, seat: &Seat<'_>) -> Result<Vec
     for geometry in geometries(args) {
         let with = |detail: &[Criterion]| scene(args, &seat.exhibit.transfer, seat.camera, geometry, detail);
         let scenes = [with(&[Criterion::FullResolution]), with(&args.detail)];
-        let references = [reference(seat.tree, &scenes[0])?, reference(seat.tree, &scenes[1])?];
-        for backend in &mut rivals.present {
-            if !geometries_of(args, backend.as_ref()).any(|own| own == geometry) {
-                continue;
-            }
-            let row = contest(args, backend.as_mut(), seat, geometry, (&scenes, &references))?;
+        let draws = |backend: &dyn Backend| geometries_of(args, backend).any(|own| own == geometry);
+        let Some(any) = rivals.present.iter().find(|backend| draws(backend.as_ref())) else { continue };
+        let judge = |scene: &Scene| Judge::new(seat.tree, scene, any.as_ref());
+        let judges = [judge(&scenes[0])?, judge(&scenes[1])?];
+        for backend in rivals.present.iter_mut().filter(|backend| draws(backend.as_ref())) {
+            let row = contest(args, backend.as_mut(), seat, geometry, (&scenes, &judges))?;
             print(&line(&row))?;
             rows.push(row);
         }
@@ -105,7 +104,7 @@ fn contest(
     backend: &mut dyn Backend,
     seat: &Seat<'_>,
     geometry: Geometry,
-    (scenes, references): (&[Scene; 2], &[Discrete; 2]),
+    (scenes, judges): (&[Scene; 2], &[Judge; 2]),
 ) -> Result<Row, LamarError> {
     let mut contestants = [0, 1].map(|i| Contestant::new(seat.tree, &scenes[i]));
     let mut last = [None, None];
@@ -114,9 +113,9 @@ fn contest(
             *last = Some(contestant.frame(backend)?);
         }
     }
-    let cell = |i: usize, contestant: &mut Contestant<'_>| -> Result<Cell, LamarError> {
+    let cell = |i: usize, contestant: &Contestant<'_>| -> Result<Cell, LamarError> {
         let (image, drawn) = last[i].as_ref().expect("at least one frame");
-        let complaint = contestant.judge(image, &references[i], backend)?;
+        let complaint = judges[i].complaint(image);
         let (ms, prepare_ms) = (contestant.spread(), contestant.prepare_spread());
         Ok(Cell { drawn: *drawn, ms, prepare_ms, error: distance(image, seat.answer)?, complaint })
     };
@@ -159,11 +158,12 @@ fn line(row: &Row) -> String {
 }
 
 /// What the paper claims and a row does not show.
-fn missed(rows: &[Row]) -> Vec<String> {
+fn missed(rows: &[Row]) -> Vec<Missed> {
     let name = |r: &Row| format!("{}, {}, {}^3, {}, {}", r.data, r.view, r.side, r.geometry, r.backend);
     let slower = |r: &&Row| r.view != "outside" && r.multiresolution.ms.median >= r.fixed.ms.median;
     let wrong = |r: &Row| r.fixed.complaint.clone().or_else(|| r.multiresolution.complaint.clone());
     let slower = rows.iter().filter(slower).map(|r| format!("{}: multiresolution is not faster", name(r)));
     let wrong = rows.iter().filter_map(|r| wrong(r).map(|why| format!("{}: {why}", name(r))));
+    let (slower, wrong) = (slower.map(Missed::of_times), wrong.map(Missed::of_pictures));
     slower.chain(wrong).collect()
 }

@@ -1,5 +1,6 @@
 //! A screen-space error of one pixel: what it draws, how long it takes and what it costs, view by view.
 
+use brickfield::Scene;
 use brickfield::bricks::{BrickTree, Downsampling};
 use brickfield::frame::Backend;
 use brickfield::lod::Criterion;
@@ -7,9 +8,9 @@ use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{BrickSide, Camera, Grid, Projection, ScalarType};
 use serde::Serialize;
 
-use super::measure::{Contestant, Distance, Drawn, Spread, distance};
-use super::scenes::{Geometry, geometries, scene, tree};
-use super::{LamarArgs, LamarError, print};
+use super::measure::{Contestant, Distance, Drawn, Judge, Spread, distance};
+use super::scenes::{geometries, scene, tree};
+use super::{LamarArgs, LamarError, Missed, print};
 use crate::compare::rivals::Rivals;
 use crate::volumes::{Phantom, phantom_of};
 
@@ -20,34 +21,38 @@ struct Row {
     full: (Drawn, Spread),
     pixel: (Drawn, Spread),
     error: Distance,
+    /// Why the picture of a pixel's error is not within the rule of its own cut's f64 reference.
+    complaint: Option<String>,
 }
 
-pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<String>, LamarError> {
+pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, LamarError> {
     let Phantom { volume, transfer, .. } = phantom_of(UVec3::splat(args.volume_side), ScalarType::U8);
     let tree = tree(&volume, BrickSide::S32, Downsampling::Subsample)?;
     print(&format!(
         "The phantom at {}^3, {} views, {} x {} pixels, ray caster, steps of {} voxel(s) times 2^level, bricks of 32. Errors are against\n\
-         the same backend's picture at full resolution.\n",
+         the same backend's picture at full resolution; \"ok\": within the rule of the f64 sum of the same cut, nothing culled.\n",
         args.volume_side, args.views, args.size.x, args.size.y, args.step
     ))?;
     print(
-        "view  backend  bricks: full   1 px     MB: full   1 px    ms: full    1 px  ratio   max        RMSE       colour difference: mean",
+        "view  backend  bricks: full   1 px     MB: full   1 px    ms: full    1 px  ratio   max        RMSE       colour difference: mean  as the cut says",
     )?;
     let rays = geometries(args)[3];
     let mut rows = Vec::new();
     for view in 0..args.views {
         let camera = camera(volume.grid(), view, args.views)?;
+        let with = |criterion| scene(args, &transfer, camera, rays, &[criterion]);
+        let scenes = [with(Criterion::FullResolution), with(Criterion::ScreenSpaceError { pixels: 1.0 })];
+        let judge = Judge::new(&tree, &scenes[1], rivals.present[0].as_ref())?;
         for backend in &mut rivals.present {
-            let row = of_view(args, backend.as_mut(), &tree, (view, camera), (&transfer, rays))?;
+            let row = of_view(args, backend.as_mut(), &tree, view, (&scenes, &judge))?;
             print(&line(&row))?;
             rows.push(row);
         }
     }
-    summary(&rows)?;
     let path = args.out.join("views.json");
     let json = serde_json::to_string_pretty(&rows).expect("rows are plain data");
     std::fs::write(&path, json).map_err(|source| LamarError::Out { path, source })?;
-    Ok(Vec::new())
+    summary(&rows)
 }
 
 /// On a spiral around the volume, every fourth view from inside.
@@ -67,11 +72,9 @@ fn of_view(
     args: &LamarArgs,
     backend: &mut dyn Backend,
     tree: &BrickTree,
-    (view, camera): (u32, Camera),
-    (transfer, rays): (&brickfield_core::TransferFunction, Geometry),
+    view: u32,
+    (scenes, judge): (&[Scene; 2], &Judge),
 ) -> Result<Row, LamarError> {
-    let with = |criterion| scene(args, transfer, camera, rays, &[criterion]);
-    let scenes = [with(Criterion::FullResolution), with(Criterion::ScreenSpaceError { pixels: 1.0 })];
     let mut contestants = [0, 1].map(|i| Contestant::new(tree, &scenes[i]));
     let mut last = [None, None];
     for _ in 0..args.frames {
@@ -86,6 +89,7 @@ fn of_view(
         full: (full_drawn, contestants[0].spread()),
         pixel: (pixel_drawn, contestants[1].spread()),
         error: distance(&pixel, &full.map(f64::from))?,
+        complaint: judge.complaint(&pixel),
     })
 }
 
@@ -93,7 +97,7 @@ fn line(row: &Row) -> String {
     let ((full, full_ms), (pixel, pixel_ms)) = (row.full, row.pixel);
     let megabytes = |d: Drawn| d.n_bytes as f64 / 1e6;
     format!(
-        "{:>4}  {:<7} {:>13} {:>6} {:>12.1} {:>6.1} {:>11.1} {:>7.1} {:>6.2}   {:.2e}   {:.2e}   {:.3}",
+        "{:>4}  {:<7} {:>13} {:>6} {:>12.1} {:>6.1} {:>11.1} {:>7.1} {:>6.2}   {:.2e}   {:.2e}   {:<23.3}  {}",
         row.view,
         row.backend,
         full.n_bricks,
@@ -106,10 +110,20 @@ fn line(row: &Row) -> String {
         row.error.max,
         row.error.rmse,
         row.error.delta_e_mean,
+        row.complaint.as_deref().unwrap_or("ok"),
     )
 }
 
-fn summary(rows: &[Row]) -> Result<(), LamarError> {
+/// Medians over the views, and what does not hold.
+fn summary(rows: &[Row]) -> Result<Vec<Missed>, LamarError> {
+    let more = |r: &&Row| r.pixel.0.n_bricks > r.full.0.n_bricks;
+    let more = rows
+        .iter()
+        .filter(more)
+        .map(|r| format!("view {}, {}: more bricks than at full resolution", r.view, r.backend));
+    let wrong =
+        rows.iter().filter_map(|r| r.complaint.as_ref().map(|why| format!("view {}, {}: {why}", r.view, r.backend)));
+    let mut missed: Vec<Missed> = more.chain(wrong).map(Missed::of_pictures).collect();
     let mut names: Vec<&str> = rows.iter().map(|r| r.backend).collect();
     names.sort_unstable();
     names.dedup();
@@ -124,6 +138,9 @@ fn summary(rows: &[Row]) -> Result<(), LamarError> {
             "\n{name}: medians over views: {:.0} % of the bricks, {time:.2} times as fast, RMSE {rmse:.1e}; greatest difference in any view {worst:.2e}",
             100.0 * bricks
         ))?;
+        if time <= 1.0 {
+            missed.push(Missed::of_times(format!("views, {name}: {time:.2} times as fast as full resolution")));
+        }
     }
-    Ok(())
+    Ok(missed)
 }

@@ -87,7 +87,7 @@ fn of_ray<S: Stored>(field: &Field<S>, ray: &PlanRay, cause: Cause) -> f64 {
     };
     let (mut bound, mut least_depth) = (0.0, 0.0);
     for part in parts(plan, ray, span) {
-        let values = |x: &f64| values(field, part, plan.rays.center + ray.at(part.at(*x)), &stray);
+        let values = |x: &f64| values(field, part, plan.rays.center + ray.at(part.at(*x)), stray);
         let nodes: Vec<Values> = plan.sampling.rule().nodes().iter().map(values).collect();
         let (change, least) = spread(plan, &nodes, part);
         bound += transmittance(least_depth) * change;
