@@ -46,6 +46,8 @@ pub enum PrepareError {
         "about {n_polygons:.1e} polygons; at most {limit} are possible: take a larger step, larger bricks or a coarser level"
     )]
     TooManyPolygons { n_polygons: f64, limit: u32 },
+    #[error("{n_facets} facets of {facet_pixels} pixels; at most {limit} are possible: take larger facets")]
+    TooManyFacets { n_facets: u32, facet_pixels: u32, limit: u32 },
     #[error(transparent)]
     Sampling(#[from] SamplingError),
     #[error(transparent)]
@@ -60,6 +62,8 @@ const MOST_VALUE: f64 = 1e300;
 const LEAST_WIDTH: f64 = 1e-300;
 /// Most polygons of a frame, about: a gigabyte of corners.
 pub const MAX_POLYGONS: u32 = 1 << 22;
+/// Most facets of tessellated shells, two for each of their squares: 64 MiB of planes.
+pub const MAX_FACETS: u32 = 1 << 22;
 /// Most segments on a ray: an f32 counts them exactly.
 pub const MAX_SEGMENTS: u32 = 1 << 24;
 
@@ -103,6 +107,7 @@ pub fn prepare_selection(
     let steps = Steps::of(&sampling, scene.placement, coarsest)?;
     let rays = RayFrame::new(&scene.camera, grid, scene.size, &volume_box(tree), &steps);
     check_segments(rays.n_segments)?;
+    check_facets(&rays)?;
     let resident = resident_bricks(tree, scene, selection, &domain);
     if resident.len() >= IndexEntry::MAX_SLOTS as usize {
         return Err(PrepareError::TooManyBricks { n_bricks: resident.len(), limit: IndexEntry::MAX_SLOTS });
@@ -162,6 +167,15 @@ fn check_technique(scene: &Scene) -> Result<(), PrepareError> {
         (_, Placement::Shells, _) => Err(PrepareError::RoundPolygons),
         (_, _, Division::Ray) => Err(PrepareError::PolygonsOfRays),
         (_, _, Division::Brick) => Ok(()),
+    }
+}
+
+fn check_facets(rays: &RayFrame) -> Result<(), PrepareError> {
+    match (rays.placement, rays.n_facets()) {
+        (Placement::TessellatedShells { facet_pixels }, n_facets) if n_facets > MAX_FACETS => {
+            Err(PrepareError::TooManyFacets { n_facets, facet_pixels, limit: MAX_FACETS })
+        }
+        _ => Ok(()),
     }
 }
 
@@ -377,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn polygons_that_no_memory_holds_and_those_of_spheres_and_rays_are_refused() {
+    fn polygons_and_facets_that_no_memory_holds_and_polygons_of_spheres_and_rays_are_refused() {
         let grid = Grid::axis_aligned(UVec3::splat(64), DVec3::ONE).unwrap();
         let tree = build_tree(&Volume::new(grid, vec![1u8; 64 * 64 * 64]).unwrap(), &BuildOptions::default()).unwrap();
         let camera = Camera::framing(&grid.world_box(), DVec3::X, DVec3::Z).unwrap();
@@ -393,5 +407,13 @@ mod tests {
         assert_eq!(plan(1.0, Placement::ObjectPlanes, Division::Ray), Err(PrepareError::PolygonsOfRays));
         let many = plan(1e-5, Placement::ObjectPlanes, Division::Brick);
         assert!(matches!(many, Err(PrepareError::TooManyPolygons { .. })), "{many:?}");
+        let scene = Scene::new(camera, UVec2::new(4096, 2048), fog.clone());
+        let facets = |facet_pixels| {
+            let scene = Scene { placement: Placement::TessellatedShells { facet_pixels }, ..scene.clone() };
+            prepare(&tree, &scene, &mut Residency::default()).map(|_| ())
+        };
+        let limit = MAX_FACETS;
+        let many = PrepareError::TooManyFacets { n_facets: 4 * limit, facet_pixels: 1, limit };
+        assert_eq!((facets(1), facets(2)), (Err(many), Ok(())));
     }
 }

@@ -38,7 +38,7 @@ fn eyes() -> Vec<Case> {
             [10.5, 11.5, 12.5],
             [30.0, 31.0, 25.0],
         ),
-        case("eye/on-a-face", catches![AnchorHalfVoxel, RowsFlipped, shader::FLAT_SHELLS], [20.0, 0.0, 16.0], far),
+        case("eye/on-a-face", catches![AnchorHalfVoxel, RowsFlipped, PixelCorner], [20.0, 0.0, 16.0], far),
         case(
             "eye/on-a-brick-face",
             catches![IndexSwapped, shader::INDEX_STRIDE],
