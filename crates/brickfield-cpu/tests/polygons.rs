@@ -42,7 +42,7 @@ fn fragments(proxy: &ProxyGeometry, at: DVec2) -> Vec<Fragment> {
 fn ray_beside(plan: &FramePlan, (x, y): (u32, u32), beside: [f64; 3]) -> PlanRay {
     let ray = plan.rays.ray(x, y);
     let far = plan.domain.diagonal() / ray.direction.length();
-    PlanRay { anchor: ray.anchor + DVec3::from(beside) * plan.rays.rounding(&ray, far), ..ray }
+    PlanRay { anchor: ray.anchor + DVec3::from(beside) * plan.rays.rounding(x, y, &ray, far), ..ray }
 }
 
 /// The far ends of a ray's segments in the bricks, from back to front: brick, and surface.
@@ -97,6 +97,7 @@ proptest! {
         placement in 0usize..3,
         nominal in any::<bool>(),
         seed in any::<u32>(),
+        side in prop::sample::select(vec![BrickSide::S16, BrickSide::S32, BrickSide::S64]),
         step_world in 0.9f64..5.0,
     ) {
         let volume = support::volume([50, 40, 34], DVec3::new(1.0, 1.2, 0.7), ScalarType::U8, |_| 100.0);
@@ -117,7 +118,7 @@ proptest! {
             camera,
             step_world,
             level: &level,
-            side: BrickSide::S16,
+            side,
             size: UVec2::new(17, 13),
             placement: placements[placement],
             division: Division::Brick,
@@ -125,7 +126,7 @@ proptest! {
             ..Setup::new(&volume, TransferFunction::constant(0.1, [1.0; 3]).unwrap())
         }
         .plan();
-        let layout = BrickLayout::new(volume.grid().dims(), BrickSide::S16);
+        let layout = BrickLayout::new(volume.grid().dims(), side);
         let is_first = |cell: &UVec3| match plan.index.at(*cell) {
             IndexEntry::Resident { level, .. } => *cell >> u32::from(level.0) << u32::from(level.0) == *cell,
             IndexEntry::Transparent { .. } => false,

@@ -1,6 +1,6 @@
 //! The rays of a frame in sample space, in a form that keeps its digits in f32.
 
-use brickfield_core::glam::{DVec2, DVec3, UVec2};
+use brickfield_core::glam::{DMat3, DVec2, DVec3, UVec2};
 use brickfield_core::{Aabb, Camera, Grid, IndexPos, Projection, SamplePos, WorldPos};
 
 use crate::{Placement, PlaneStacks, Steps};
@@ -30,7 +30,7 @@ pub struct RayFrame {
     /// Distance from the eye to the plane of the anchors, along the view direction; 0 for parallel rays.
     pub anchor_depth: f64,
     /// Where surface 0 lies: this many world units from the eye along the surfaces' normals, a whole number of steps (of the
-    /// coarsest level's steps). Object-aligned planes start at the volume instead.
+    /// coarsest level's steps). Object-aligned planes start before the volume instead ([`PlaneStacks`]).
     pub start: f64,
     /// Segments from the start to the farthest point of the volume, rounded up.
     pub n_segments: f64,
@@ -60,7 +60,8 @@ pub struct PlanRay {
 impl RayFrame {
     /// The rays of a camera's picture of a grid, with the surfaces of `steps`.
     ///
-    /// `domain` is the part of sample space that is rendered; the frame starts a whole number of steps before it.
+    /// `domain` is the volume's box in sample space, whatever of it is rendered: the frame starts a whole number of steps before
+    /// it, and object-aligned planes a sixth of a voxel.
     pub fn new(camera: &Camera, grid: &Grid, size: UVec2, domain: &Aabb, steps: &Steps) -> RayFrame {
         let to_sample = |p: DVec3| SamplePos::from(grid.index(WorldPos(p))).0;
         let turn = |v: DVec3| grid.world_to_index().transform_vector3(v);
@@ -143,21 +144,62 @@ impl RayFrame {
         }
     }
 
-    /// How far f32 may put a position of a ray from where it is, along each axis, in voxels, for parameters up to `far`.
+    /// How far f32 may put a position of a pixel's ray from where it is, along each axis, in voxels, for parameters up to `far`.
     ///
-    /// A position is anchor + direction (t - t_anchor), relative to the centre. Each of its terms is the result of at most eight
-    /// roundings (three products and two sums for the anchor, the same and a normalisation for the direction, a product and
-    /// a sum for t), each of at most 2^-24 of the term; and so is what shifts it to the first sample and divides it by the
-    /// brick's cells. So it is off by at most 8 * 2^-24 * (|center| + |anchor| + |direction| (|t| + |t_anchor|)), a few times the
-    /// volume's extent times 5e-7.
-    pub fn rounding(&self, ray: &PlanRay, far: f64) -> DVec3 {
-        (self.center.abs() + ray.anchor.abs() + ray.direction.abs() * (far + ray.t_anchor.abs())) * ROUNDING
+    /// A position is anchor + direction (t - t_anchor), relative to the centre. Anchor and direction are themselves sums of three
+    /// terms, which may cancel; t is one of products. Each term is the result of at most eight roundings (three products and
+    /// two sums for the anchor, the same and a normalisation for the direction, a product and a sum for t), each of at most
+    /// 2^-24 of the term; and so is what shifts it to the first sample and divides it by the brick's cells. So it is off by at
+    /// most 8 * 2^-24 * (|center| + anchor + direction (|t| + |t_anchor|)), where anchor and direction are sums of magnitudes.
+    pub fn rounding(&self, x: u32, y: u32, ray: &PlanRay, far: f64) -> DVec3 {
+        let at = self.past_middle(x, y);
+        let length = (1.0 + (at * self.pixel).length_squared()).sqrt();
+        let direction = magnitude(&self.direction, at) / length;
+        (self.center.abs() + magnitude(&self.anchor, at) + direction * (far + ray.t_anchor.abs())) * ROUNDING
+    }
+
+    /// How far f32 may put a position of any ray from where it is, along each axis, in voxels, as far as the ray runs in a box
+    /// around the centre of half these extents: no less than [`rounding`](Self::rounding) of all rays.
+    pub fn most_rounding(&self, half: DVec3) -> DVec3 {
+        let corner = 0.5 * self.size.as_dvec2();
+        let anchor = magnitude(&self.anchor, corner);
+        let [forward, right, down] = self.direction;
+        // Perspective: of a direction across, x pixels weigh no more than x pixel / (x pixel).
+        let direction = match self.pixel {
+            0.0 => forward.abs(),
+            pixel => magnitude(&self.direction, corner).min(forward.abs() + (right.abs() + down.abs()) / pixel),
+        };
+        let way = (half.length() + anchor.length()) / self.least_voxels_per_unit();
+        let corners = [(0, 0), (self.size.x - 1, 0), (0, self.size.y - 1), (self.size.x - 1, self.size.y - 1)];
+        let rays = corners.into_iter().chain([(self.size.x / 2, self.size.y / 2)]).map(|(x, y)| self.ray(x, y));
+        // Rays meet their planes at a slant of at most 1 / sqrt 3.
+        let t_anchor = rays.map(|ray| ray.t_anchor.abs()).fold(2.0 * way, f64::max);
+        (self.center.abs() + anchor + direction * (way + 2.0 * t_anchor)) * ROUNDING
+    }
+
+    /// No ray crosses fewer voxels in a world unit.
+    fn least_voxels_per_unit(&self) -> f64 {
+        let [forward, right, down] = self.direction;
+        match self.pixel {
+            0.0 => forward.length(),
+            pixel => {
+                let to_world = DMat3::from_cols(forward, right / pixel, down / pixel).inverse();
+                let columns = [to_world.x_axis, to_world.y_axis, to_world.z_axis];
+                columns.into_iter().map(DVec3::length_squared).sum::<f64>().sqrt().recip()
+            }
+        }
+    }
+
+    /// The centre of a pixel, in pixels from the picture's.
+    #[inline]
+    fn past_middle(&self, x: u32, y: u32) -> DVec2 {
+        DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) - 0.5 * self.size.as_dvec2()
     }
 
     /// The ray through the centre of pixel (x, y).
     #[inline]
     pub fn ray(&self, x: u32, y: u32) -> PlanRay {
-        let at = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) - 0.5 * self.size.as_dvec2();
+        let at = self.past_middle(x, y);
         let mix = |v: &[DVec3; 3]| v[0] + v[1] * at.x + v[2] * at.y;
         let across = at * self.pixel;
         let square = across.length_squared();
@@ -194,6 +236,12 @@ impl PlanRay {
         self.anchor + self.direction * (t - self.t_anchor)
     }
 }
+
+/// The magnitudes of the terms of v0 + v1 x + v2 y, added up.
+fn magnitude(v: &[DVec3; 3], at: DVec2) -> DVec3 {
+    v[0].abs() + v[1].abs() * at.x.abs() + v[2].abs() * at.y.abs()
+}
+
 /// Distance to the farthest of some points, as rays measure it.
 fn farthest(camera: &Camera, from_eye: &[DVec3]) -> f64 {
     let distance = |v: &DVec3| match camera.projection() {
@@ -211,7 +259,7 @@ fn from_eye(camera: &Camera, grid: &Grid, domain: &Aabb) -> [DVec3; 8] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use brickfield_core::glam::{DMat3, UVec3};
+    use brickfield_core::glam::{UVec3, Vec3};
 
     fn check(camera: &Camera, grid: &Grid, tolerance: f64) {
         let size = UVec2::new(40, 30);
@@ -320,6 +368,49 @@ mod tests {
         let of = |placement| frame(placement, parallel).0.ray(3, 4);
         for placement in [Placement::ViewportPlanes, Placement::TessellatedShells { facet_pixels: 5 }] {
             assert_eq!(of(placement), of(Placement::Shells));
+        }
+    }
+
+    /// A pixel's ray as shaders make it (rays.wesl): its position `u` world units past the anchor.
+    fn position_in_f32(frame: &RayFrame, (x, y): (u32, u32), u: f64) -> DVec3 {
+        let f32s = |v: &[DVec3; 3]| v.map(|v| v.as_vec3());
+        let (anchor, direction) = (f32s(&frame.anchor), f32s(&frame.direction));
+        let at = frame.past_middle(x, y).as_vec2();
+        let across = at * frame.pixel as f32;
+        let length = (1.0 + across.dot(across)).sqrt();
+        let mix = |v: [Vec3; 3]| v[0] + v[1] * at.x + v[2] * at.y;
+        let (anchor, direction) = (mix(anchor), mix(direction) / length);
+        (direction * u as f32 + anchor).as_dvec3()
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn f32_is_within_the_rounding_that_is_stated(
+            dims in proptest::sample::select(vec![[512, 512, 60], [1000, 1000, 2], [64, 64, 64], [3, 400, 90]]),
+            spacing in proptest::array::uniform3(0.2f64..3.0),
+            eye in proptest::array::uniform3(-1.0f64..2.0),
+            target in proptest::array::uniform3(0.0f64..1.0),
+            fov_y in 0.001f64..3.1,
+            pixel in (0u32..41, 0u32..31),
+            along in 0.0f64..1.0,
+        ) {
+            let direction = DMat3::from_cols(DVec3::new(0.0, 0.6, 0.8), DVec3::X, DVec3::new(0.0, 0.8, -0.6));
+            let grid = Grid::from_first_sample(dims.into(), spacing.into(), DVec3::new(70.0, -20.0, 3.0), direction).unwrap();
+            let domain = Aabb { min: DVec3::splat(-0.5), max: grid.dims().as_dvec3() - 0.5 };
+            let at = |p: [f64; 3]| grid.world(IndexPos(grid.dims().as_dvec3() * DVec3::from(p))).0;
+            let Ok(camera) = Camera::look_at(at(eye), at(target), DVec3::X, Projection::Perspective { fov_y }) else {
+                return Ok(());
+            };
+            let size = UVec2::new(41, 31);
+            let frame = RayFrame::new(&camera, &grid, size, &domain, &Steps::shells(1.0));
+            let ray = frame.ray(pixel.0, pixel.1);
+            let far = grid.world_box().diagonal() * along;
+            let off = (position_in_f32(&frame, pixel, far) - (ray.anchor + ray.direction * far)).abs();
+            let bound = frame.rounding(pixel.0, pixel.1, &ray, far);
+            proptest::prop_assert!(off.cmple(bound).all(), "{off} {bound}");
+            let half = 0.5 * domain.extent();
+            let within = ray.at(far + ray.t_anchor).abs().cmple(half).all();
+            proptest::prop_assert!(!within || bound.cmple(frame.most_rounding(half) * 1.0001).all(), "{bound}");
         }
     }
 }

@@ -82,6 +82,9 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
 /// The plan of a frame of bricks that were selected before, by filters of one's own for example
 /// ([`select_by`](brickfield_lod::select_by)); the scene's criteria are not asked.
 ///
+/// Bricks that the selection ignores are not there, whatever the scene's [`Skipping`]: what they hold is transparent, and so are
+/// the segments of [`QuadratureRule::PreIntegrated`] that end in them.
+///
 /// # Errors
 /// As [`prepare`], and a selection of another octree.
 pub fn prepare_selection(
@@ -252,7 +255,7 @@ fn clipped_domain(tree: &BrickTree, clip: Option<Aabb>) -> Result<Aabb, PrepareE
 /// The bricks that the frame needs, in their slots.
 fn resident_bricks(tree: &BrickTree, scene: &Scene, selection: &Selection, domain: &Aabb) -> Vec<BrickId> {
     if scene.skipping == Skipping::Off {
-        return selection.cut().bricks().to_vec();
+        return selection.drawn().collect();
     }
     let reach = match (scene.rule, scene.division) {
         (QuadratureRule::PreIntegrated, Division::Ray) => segment_reach(tree, scene),
@@ -339,6 +342,7 @@ mod tests {
     use super::*;
     use brickfield_bricks::{BuildOptions, build_tree};
     use brickfield_core::{Camera, Grid, Projection, TransferFunction, Volume};
+    use brickfield_lod::{Answer, Tile, select_by};
 
     #[test]
     fn values_at_the_ends_of_f64_are_refused() {
@@ -388,6 +392,26 @@ mod tests {
             refused.contains("in [65, 65, 65] samples, for an octree") && refused.contains("in [64, 64, 64]"),
             "{refused}"
         );
+    }
+
+    #[test]
+    fn bricks_that_a_selection_ignores_are_not_there() {
+        let grid = Grid::axis_aligned(UVec3::splat(64), DVec3::ONE).unwrap();
+        let tree =
+            build_tree(&Volume::new(grid, vec![1u8; grid.n_voxels()]).unwrap(), &BuildOptions::default()).unwrap();
+        let near_half = |tile: &Tile<'_>| match tile.sample_box().max.x {
+            x if x > 32.0 && tile.id().level == Level(0) => Answer::Ignore,
+            _ => Answer::Descend,
+        };
+        let selection = select_by(tree.layout(), tree.grid(), near_half);
+        let camera = Camera::framing(&grid.world_box(), DVec3::new(0.3, 1.0, 0.2), DVec3::Z).unwrap();
+        let scene = Scene::new(camera, UVec2::new(4, 4), TransferFunction::constant(0.1, [1.0; 3]).unwrap());
+        for skipping in [Skipping::On, Skipping::Off] {
+            let (scene, mut residency) = (Scene { skipping, ..scene.clone() }, Residency::default());
+            prepare_selection(&tree, &scene, &selection, &mut residency).unwrap();
+            let drawn: Vec<_> = selection.drawn().collect();
+            assert!(residency.bricks() == drawn && drawn.len() < selection.cut().bricks().len(), "{skipping:?}");
+        }
     }
 
     #[test]

@@ -12,6 +12,8 @@ use crate::compare::CompareError;
 pub enum LamarError {
     #[error("no data: set BRICKFIELD_DATA (or --data) to the folder of real volumes")]
     NoData,
+    #[error("--only {only}: no data set's path contains that; there are {known}")]
+    NoSuchData { only: String, known: String },
     #[error(transparent)]
     Volume(#[from] brickfield::io::OpenError),
     #[error("--out {}: {source}", path.display())]
@@ -47,7 +49,7 @@ impl LamarError {
     pub fn status(&self) -> u8 {
         match self {
             LamarError::Backends(e) => e.status(),
-            LamarError::NoData | LamarError::Prepare(_) => 2,
+            LamarError::NoData | LamarError::NoSuchData { .. } | LamarError::Prepare(_) => 2,
             _ => 1,
         }
     }

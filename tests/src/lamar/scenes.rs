@@ -37,6 +37,9 @@ pub(super) fn exhibits(args: &LamarArgs) -> Result<impl Iterator<Item = Result<E
     let folder = args.data.clone().ok_or(LamarError::NoData)?;
     let wanted = |path: &&str| args.only.as_ref().is_none_or(|text| path.contains(text.as_str()));
     let paths: Vec<&str> = DATA.into_iter().filter(wanted).collect();
+    if paths.is_empty() {
+        return Err(LamarError::NoSuchData { only: args.only.clone().unwrap_or_default(), known: DATA.join(", ") });
+    }
     Ok(paths.into_iter().map(move |path| exhibit(&folder, path)))
 }
 

@@ -12,6 +12,7 @@ use brickfield_core::{BrickId, BrickSide, Camera, Grid, Image, Optics, Projectio
 use super::scenes::{Geometry, geometries, geometries_of, scene, tree};
 use super::{LamarArgs, LamarError, Missed, print};
 use crate::compare::rivals::Rivals;
+use crate::metrics::errors;
 
 /// Voxels along the cube's side.
 const SIDE: u32 = 96;
@@ -73,11 +74,13 @@ fn seams(
         let scene = scene(args, fog, camera()?, geometry, &[Criterion::FullResolution]);
         let exact = closed_form(&scene, tree.grid());
         let single = render(tree, &scene, None, backend)?;
-        let (mut seam, mut off) = (0.0f64, greatest(&single, &exact));
+        // Of what is not a number there is no greatest: that is an error.
+        let greatest_difference = |a: &Image<f32>, b: &Image<f64>| errors(a, b).map(|e| e.worst.difference);
+        let (mut seam, mut off) = (0.0f64, greatest_difference(&single, &exact)?);
         for cut in &cuts {
             let picture = render(tree, &scene, Some(cut), backend)?;
-            seam = seam.max(greatest(&picture, &single.map(f64::from)));
-            off = off.max(greatest(&picture, &exact));
+            seam = seam.max(greatest_difference(&picture, &single.map(f64::from))?);
+            off = off.max(greatest_difference(&picture, &exact)?);
         }
         let name = backend.describe().backend;
         print(&format!(
@@ -227,11 +230,6 @@ fn closed_form(scene: &Scene, grid: &Grid) -> Image<f64> {
     image
 }
 
-fn greatest(a: &Image<f32>, b: &Image<f64>) -> f64 {
-    let pairs = a.pixels().iter().flatten().zip(b.pixels().iter().flatten());
-    pairs.map(|(x, y)| (f64::from(*x) - y).abs()).fold(0.0, f64::max)
-}
-
 /// Optical depth over true optical depth, of pixels that lie behind enough to tell.
 struct Ratios {
     middle: f64,
@@ -245,8 +243,12 @@ impl Ratios {
     /// Whether they are what figure 8 shows of a geometry.
     fn are_of(&self, placement: Placement) -> bool {
         match placement {
-            Placement::ObjectPlanes => self.rim < 0.9 && self.middle < 0.9,
-            Placement::ViewportPlanes => self.rim < 0.97 && self.rim < self.middle && self.middle < 1.0,
+            // The cosine of a ray to its planes is no less than 1 / sqrt 3.
+            Placement::ObjectPlanes => [self.rim, self.middle].into_iter().all(|r| 0.57 < r && r < 0.9),
+            // Half a field of view of 40 degrees: no less than its cosine.
+            Placement::ViewportPlanes => {
+                0.76 < self.rim && self.rim < 0.97 && self.rim < self.middle && self.middle < 1.0
+            }
             Placement::Shells | Placement::TessellatedShells { .. } => (self.mean - 1.0).abs() < 0.02,
         }
     }

@@ -138,6 +138,10 @@ fn summary(rows: &[Row]) -> Result<Vec<Missed>, LamarError> {
             "\n{name}: medians over views: {:.0} % of the bricks, {time:.2} times as fast, RMSE {rmse:.1e}; greatest difference in any view {worst:.2e}",
             100.0 * bricks
         ))?;
+        if bricks >= 1.0 {
+            let what = format!("views, {name}: {:.0} % of the bricks of full resolution", 100.0 * bricks);
+            missed.push(Missed::of_pictures(what));
+        }
         if time <= 1.0 {
             missed.push(Missed::of_times(format!("views, {name}: {time:.2} times as fast as full resolution")));
         }

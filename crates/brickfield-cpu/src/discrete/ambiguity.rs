@@ -12,7 +12,7 @@
 //! T (|e' - e| + |e^-d' - e^-d|), T being the transmittance before it: what lies behind has colours of at most 1. Segments
 //! change one after the other; T is taken with the least depths that the segments before may have. The sum is a bound.
 
-use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, Level, Span};
 use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, PlanRay};
 use brickfield_optics::{Segment, alpha, transmittance};
@@ -20,7 +20,7 @@ use brickfield_optics::{Segment, alpha, transmittance};
 use super::field::{Field, Stored};
 use super::walk::{Part, clip, middle, parts, parts_in_block, segments, whole};
 use super::{part_values, relative, segment};
-use crate::blocks::Blocks;
+use crate::blocks::{Blocks, Crossing};
 
 /// How far the cosines of a ray's angles to planes may be off: a few roundings of numbers below 1.
 pub(super) const TIE: f64 = 1e-6;
@@ -34,6 +34,8 @@ pub(super) struct Ambiguity {
     jumps: Vec<f64>,
     /// The greatest extinction of the transfer function.
     max_extinction: f64,
+    /// The coarsest level of resident blocks.
+    coarsest: Level,
 }
 
 /// The values that a node may have; the first is the one it has in f64.
@@ -48,19 +50,23 @@ impl Ambiguity {
             several_kinds: has_several_kinds(field.plan),
             jumps: (0..knots.len() - 1).filter(jump).map(|i| knots[i].value).collect(),
             max_extinction: knots.iter().map(|k| k.extinction).fold(0.0, f64::max),
+            coarsest: entries(field.plan).filter_map(resident_level).max().unwrap_or(Level(0)),
         }
     }
 
     /// The most by which a channel of the ray's pixel may change.
-    pub(super) fn of_ray<S: Stored>(&self, field: &Field<S>, ray: &PlanRay) -> f64 {
+    pub(super) fn of_ray<S: Stored>(&self, field: &Field<S>, at: UVec2, ray: &PlanRay) -> f64 {
         let plan = field.plan;
         let domain = relative(&plan.domain, plan.rays.center);
         let far = domain.extent().length() / ray.direction.length() + ray.t_anchor.abs();
-        let delta = plan.rays.rounding(ray, far);
+        let delta = plan.rays.rounding(at.x, at.y, ray, far);
         match clip(ray, &domain, ray.t_eye) {
             Some(_) if clip(ray, &grown(&domain, -delta), ray.t_eye).is_none() => self.grazing(ray, &domain, delta),
             None => self.grazing(ray, &domain, delta),
-            Some(span) => self.inside(field, ray, span),
+            Some(span) => {
+                let delta = plan.rays.rounding(at.x, at.y, ray, span.start.abs().max(span.end.abs()));
+                self.inside(field, ray, span, delta)
+            }
         }
     }
 
@@ -70,22 +76,21 @@ impl Ambiguity {
         span.map_or(0.0, |span| alpha(self.max_extinction * (span.end - span.start)))
     }
 
-    fn inside<S: Stored>(&self, field: &Field<S>, ray: &PlanRay, span: Span) -> f64 {
+    fn inside<S: Stored>(&self, field: &Field<S>, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
         let sampling = &field.plan.sampling;
-        let delta = field.plan.rays.rounding(ray, span.start.abs().max(span.end.abs()));
         let appearing = match sampling.lengths() {
             Lengths::True => 0.0,
             Lengths::Nominal => self.appearing(field, ray, span, delta),
         };
-        let (nodes_stray, rays_stray) = match sampling.division() {
-            Division::Ray => (self.several_kinds, false),
-            Division::Brick => (false, self.several_kinds),
-        };
+        let nodes_stray = self.several_kinds && sampling.division() == Division::Ray;
         let changing = match nodes_stray || !self.jumps.is_empty() {
             true => self.changing(field, ray, span, delta),
             false => 0.0,
         };
-        let straying = if rays_stray { straying(field, ray, span, delta) } else { 0.0 };
+        let straying = match sampling.division() {
+            Division::Ray => 0.0,
+            Division::Brick => self.straying(field, ray, span, delta),
+        };
         appearing + changing + straying
     }
 
@@ -132,6 +137,57 @@ impl Ambiguity {
         }
     }
 
+    /// The change by a ray that runs along the face of a block within rounding: it may be in the block beside it, and cross the face,
+    /// which cuts a segment, anywhere.
+    ///
+    /// Piece by piece, between surfaces of the coarsest level: the light that the ray has there, against what it has in any of
+    /// the blocks beside it; and twice what a cut through the middle of any segment changes. What is too short to hold 1e-5 is left out.
+    fn straying<S: Stored>(&self, field: &Field<S>, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
+        const LITTLE: f64 = 1e-5;
+        let plan = field.plan;
+        let own: Vec<Crossing> = Blocks::new(plan, ray, span).collect();
+        let (mut bound, mut least_depth) = (0.0, 0.0f64);
+        for crossing in &own {
+            let b = plan.block_box(crossing.cell);
+            let (mut change, mut least) = (0.0, 0.0);
+            for along in along_faces(ray, &b, crossing.span, delta, LITTLE / self.max_extinction) {
+                let ways = ways_beside(plan, ray, along, delta);
+                let (along_change, along_less) = self.change_along(field, ray, along, (&own, &ways));
+                change += along_change;
+                least += along_less;
+            }
+            bound += transmittance(least_depth) * change;
+            least_depth += (light(field, ray, &own, crossing.span).sum.depth - least).max(0.0);
+        }
+        bound
+    }
+
+    /// How much the light along a span may change if blocks are crossed in another way, and by how much its depth may be less.
+    fn change_along<S: Stored>(
+        &self,
+        field: &Field<S>,
+        ray: &PlanRay,
+        along: Span,
+        (own, ways): (&Vec<Crossing>, &[Vec<Crossing>]),
+    ) -> (f64, f64) {
+        let step = field.plan.sampling.step_world() * f64::from(self.coarsest.stride()) * ray.stretch;
+        let (mut change, mut less, mut by_cut) = (0.0, 0.0, 0.0f64);
+        for piece in segments(along, step) {
+            let piece = Span { start: piece.start.max(along.start), end: piece.end.min(along.end) };
+            let here = light(field, ray, own, piece);
+            let (mut most, mut least) = (0.0f64, here.sum.depth);
+            for there in ways.iter().map(|way| light(field, ray, way, piece)) {
+                most = most.max(difference(&here.sum, &there.sum));
+                least = least.min(there.sum.depth);
+                by_cut = by_cut.max(there.by_cut);
+            }
+            by_cut = by_cut.max(here.by_cut);
+            change += most;
+            less += here.sum.depth - least;
+        }
+        (change + 2.0 * by_cut, less)
+    }
+
     /// Whether a node at `q` could be close to a jump; quick, and never wrongly no.
     fn may_be_close<S: Stored>(&self, field: &Field<S>, part: Part, q: DVec3, delta: DVec3) -> bool {
         let q = field.clamped(q);
@@ -172,33 +228,8 @@ impl Ambiguity {
     }
 }
 
-/// The change by a ray that runs along the face of a block within rounding, and may be in the block beside it, which has other
-/// segments.
-fn straying<S: Stored>(field: &Field<S>, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
-    let plan = field.plan;
-    let (mut bound, mut least_depth) = (0.0, 0.0f64);
-    for crossing in Blocks::new(plan, ray, span) {
-        let own = sum(field, ray, &[(crossing.span, crossing.cell)]);
-        let (mut change, mut least) = (0.0f64, own.depth);
-        for along in along_faces(ray, &plan.block_box(crossing.cell), crossing.span, delta) {
-            let before = Span { start: crossing.span.start, end: along.start };
-            let after = Span { start: along.end, end: crossing.span.end };
-            for cell in cells_beside(field, ray, crossing.cell, along, delta) {
-                let other = sum(field, ray, &[(before, crossing.cell), (along, cell), (after, crossing.cell)]);
-                change = change.max(difference(&own, &other));
-                least = least.min(other.depth);
-            }
-        }
-        bound += transmittance(least_depth) * change;
-        least_depth += least;
-    }
-    bound
-}
-
-/// Where a ray is within `delta` of a face of a box for a while. Where it goes straight through, rounding moves it from one side
-/// to the other by next to nothing.
-fn along_faces(ray: &PlanRay, b: &Aabb, span: Span, delta: DVec3) -> Vec<Span> {
-    const A_WHILE: f64 = 16.0;
+/// Where a ray is within `delta` of a face of a box, for longer than `least`.
+fn along_faces(ray: &PlanRay, b: &Aabb, span: Span, delta: DVec3, least: f64) -> Vec<Span> {
     let near = |(axis, face): (usize, f64)| {
         let (d, slab) = (ray.direction[axis], [face - delta[axis], face + delta[axis]]);
         let at = slab.map(|p| (p - ray.anchor[axis]) / d + ray.t_anchor);
@@ -209,30 +240,44 @@ fn along_faces(ray: &PlanRay, b: &Aabb, span: Span, delta: DVec3) -> Vec<Span> {
         }
     };
     let faces = (0..3).flat_map(|axis| [(axis, b.min[axis]), (axis, b.max[axis])]);
-    let least = A_WHILE * delta.max_element() / ray.direction.length();
     faces.map(near).filter(|along| along.end - along.start > least).collect()
 }
 
-/// Index cells of the blocks of another kind that a ray may be in where it runs along a face.
-fn cells_beside<S: Stored>(field: &Field<S>, ray: &PlanRay, own: UVec3, along: Span, delta: DVec3) -> Vec<UVec3> {
-    let q = field.plan.rays.center + ray.at(0.5 * (along.start + along.end));
-    let at = |q: DVec3| field.index_cell(field.clamped(q));
-    let kind = |c: UVec3| Kind::of(field.plan.index.at(c));
-    cells(at(q - delta), at(q + delta)).filter(|c| kind(*c) != kind(own)).collect()
+/// The blocks along a span, as rays cross them that are off by `delta`: to all sides.
+fn ways_beside(plan: &FramePlan, ray: &PlanRay, along: Span, delta: DVec3) -> Vec<Vec<Crossing>> {
+    let sides = [-1.0, 1.0];
+    let signs = sides.into_iter().flat_map(|x| sides.into_iter().flat_map(move |y| sides.map(|z| DVec3::new(x, y, z))));
+    let beside = |sign: DVec3| PlanRay { anchor: ray.anchor + sign * delta, ..*ray };
+    signs.map(|sign| Blocks::new(plan, &beside(sign), along).collect()).collect()
 }
 
-/// The light of spans, one behind the other, each in the block that has its cell.
-fn sum<S: Stored>(field: &Field<S>, ray: &PlanRay, spans: &[(Span, UVec3)]) -> Segment {
-    let mut sum = Segment::default();
-    for (span, cell) in spans.iter().filter(|(span, _)| span.start < span.end) {
-        for part in parts_in_block(field.plan, ray, *span, *cell) {
-            let behind = segment(field.plan, part_values(field, ray, part), part.length);
-            let through = transmittance(sum.depth);
-            sum.emission = std::array::from_fn(|c| sum.emission[c] + through * behind.emission[c]);
-            sum.depth += behind.depth;
+/// The light of a piece of a ray, and the most that a cut through the middle of one of its segments changes.
+struct Light {
+    sum: Segment,
+    by_cut: f64,
+}
+
+/// The light of a piece of a ray that crosses blocks.
+fn light<S: Stored>(field: &Field<S>, ray: &PlanRay, crossings: &[Crossing], piece: Span) -> Light {
+    let mut light = Light { sum: Segment::default(), by_cut: 0.0 };
+    let of = |part: Part| segment(field.plan, part_values(field, ray, part), part.length);
+    for crossing in crossings {
+        let span = Span { start: piece.start.max(crossing.span.start), end: piece.end.min(crossing.span.end) };
+        for part in parts_in_block(field.plan, ray, span, crossing.cell) {
+            let (whole, mut halves) = (of(part), Segment::default());
+            part.halves().into_iter().for_each(|half| push(&mut halves, &of(half)));
+            light.by_cut = light.by_cut.max(difference(&whole, &halves));
+            push(&mut light.sum, &whole);
         }
     }
-    sum
+    light
+}
+
+/// Adds a segment behind others.
+fn push(sum: &mut Segment, behind: &Segment) {
+    let through = transmittance(sum.depth);
+    sum.emission = std::array::from_fn(|c| sum.emission[c] + through * behind.emission[c]);
+    sum.depth += behind.depth;
 }
 
 /// Whether a point is within `delta` of a box's surface.
@@ -262,8 +307,19 @@ impl Kind {
     }
 }
 
+fn entries(plan: &FramePlan) -> impl Iterator<Item = IndexEntry> {
+    plan.index.words().iter().map(|w| IndexEntry::unpack(*w))
+}
+
+fn resident_level(entry: IndexEntry) -> Option<Level> {
+    match entry {
+        IndexEntry::Resident { level, .. } => Some(level),
+        IndexEntry::Transparent { .. } => None,
+    }
+}
+
 fn has_several_kinds(plan: &FramePlan) -> bool {
-    let mut kinds = plan.index.words().iter().map(|w| Kind::of(IndexEntry::unpack(*w)));
+    let mut kinds = entries(plan).map(Kind::of);
     let first = kinds.next();
     kinds.any(|k| Some(k) != first)
 }

@@ -25,8 +25,9 @@ pub struct Discrete {
     /// Linear, premultiplied RGBA.
     pub image: Image<f64>,
     /// For each pixel, rows from the top: the most by which any of its channels changes when nodes within f32 rounding of
-    /// a face between blocks of different level, or of a jump of the transfer function, fall on the other side; 0 for
-    /// pixels without such a node.
+    /// a face between blocks of different level, or of a jump of the transfer function, fall on the other side; when a ray
+    /// along a face of a block runs on its other side; when it takes the other of two stacks of planes, or one more or less middle of
+    /// nominal length; 0 for pixels without any of these.
     ///
     /// A ray that runs within rounding of the domain's surface may also be missed or hit: then it is the opacity of the
     /// most that such a ray could gather.
@@ -46,7 +47,7 @@ pub struct Discrete {
 /// nothing (transparent blocks have transparent neighbours there).
 ///
 /// Accuracy: that of f64, about 1e-15 times the number of segments of a ray. Cost: about 0.16 us a sample and core,
-/// 0.4 us where several levels or jumps make pixels ambiguous.
+/// 0.4 us where several levels, jumps or bricks' own segments make pixels ambiguous.
 ///
 /// # Panics
 /// If the index names a slot that the plan's bricks do not have: such a plan is not valid.
@@ -93,7 +94,7 @@ fn pixel<S: Stored>(field: &Field<S>, ambiguity: &Ambiguity, at: UVec2) -> Pixel
     let own = along(field, &ray);
     let across = field.plan.rays.ray_across_tie(at.x, at.y, ambiguity::TIE).map(|other| along(field, &other));
     let tie = across.map_or(0.0, |other| greatest_difference(&own.rgba, &other.rgba));
-    Pixel { ambiguity: ambiguity.of_ray(field, &ray) + tie, ..own }
+    Pixel { ambiguity: ambiguity.of_ray(field, at, &ray) + tie, ..own }
 }
 
 /// The sum along a ray.

@@ -19,7 +19,7 @@
 
 use brickfield_core::TransferFunction;
 use brickfield_core::glam::{DVec3, UVec2};
-use brickfield_frame::{FramePlan, PlanRay, SampleFormat};
+use brickfield_frame::{FramePlan, SampleFormat};
 use brickfield_optics::transmittance;
 use rayon::prelude::*;
 
@@ -73,14 +73,14 @@ fn of_plan(plan: &FramePlan, cause: Cause) -> Vec<f64> {
 
 fn of_picture<S: Stored>(plan: &FramePlan, cause: Cause) -> Vec<f64> {
     let (field, size): (Field<S>, UVec2) = (Field::new(plan), plan.size());
-    let pixel = |i: u32| of_ray(&field, &plan.rays.ray(i % size.x, i / size.x), cause);
+    let pixel = |i: u32| of_pixel(&field, UVec2::new(i % size.x, i / size.x), cause);
     (0..size.x * size.y).into_par_iter().map(pixel).collect()
 }
 
-fn of_ray<S: Stored>(field: &Field<S>, ray: &PlanRay, cause: Cause) -> f64 {
-    let plan = field.plan;
+fn of_pixel<S: Stored>(field: &Field<S>, at: UVec2, cause: Cause) -> f64 {
+    let (plan, ray) = (field.plan, &field.plan.rays.ray(at.x, at.y));
     let Some(span) = clip(ray, &relative(&plan.domain, plan.rays.center), ray.t_eye) else { return 0.0 };
-    let delta = plan.rays.rounding(ray, span.start.abs().max(span.end.abs())) / AT_WORST;
+    let delta = plan.rays.rounding(at.x, at.y, ray, span.start.abs().max(span.end.abs())) / AT_WORST;
     let stray = |range: f64, stride: f64| match cause {
         Cause::Positions => range * delta.element_sum() / stride,
         Cause::Filter { sub_texel_bits } => filtered(plan, range, sub_texel_bits),

@@ -18,6 +18,15 @@ pub(super) struct Part {
 }
 
 impl Part {
+    /// The segment cut in two.
+    pub(super) fn halves(self) -> [Part; 2] {
+        let middle = self.at(0.5);
+        [
+            Part { end: middle, length: 0.5 * self.length, ..self },
+            Part { start: middle, length: 0.5 * self.length, ..self },
+        ]
+    }
+
     /// The parameter at fraction `x` of the segment.
     pub(super) fn at(self, x: f64) -> f64 {
         self.start + (self.end - self.start) * x
@@ -37,6 +46,7 @@ pub(super) fn parts(plan: &FramePlan, ray: &PlanRay, span: Span) -> Vec<Part> {
 /// The segments of a span, if all of it is in the block that has an index cell.
 pub(super) fn parts_in_block(plan: &FramePlan, ray: &PlanRay, span: Span, cell: UVec3) -> Vec<Part> {
     match plan.index.at(cell) {
+        _ if span.start >= span.end => Vec::new(),
         IndexEntry::Resident { level, .. } => divided(plan, ray, span, level, Some(cell)),
         IndexEntry::Transparent { .. } => Vec::new(),
     }

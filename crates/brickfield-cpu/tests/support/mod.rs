@@ -88,7 +88,7 @@ impl<'a> Setup<'a> {
         let steps = Steps::of(&sampling, self.placement, Level(3)).unwrap();
         let mut plan = FramePlan {
             dims: grid.dims(),
-            rays: RayFrame::new(&self.camera, grid, self.size, &domain, &steps),
+            rays: RayFrame::new(&self.camera, grid, self.size, &whole(self.volume), &steps),
             domain,
             visible: visible.intersection(&domain),
             sampling,

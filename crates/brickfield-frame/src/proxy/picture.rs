@@ -1,12 +1,10 @@
 //! From sample space to the picture.
 
-use brickfield_core::glam::{DMat3, DVec2, DVec3, UVec2};
+use brickfield_core::glam::{DMat3, DVec2, DVec3};
 
 use super::polygon::{clip, hull};
 use crate::{FramePlan, RayFrame};
 
-/// Nearer to the eye's plane than this share of a step, nothing is drawn: what a ray sees there is below rounding.
-const NEAR: f64 = 1e-9;
 /// By how many pixels polygons are grown: more than rasterisers round.
 pub(super) const GROWN: f64 = 0.125;
 /// How many pixels around the picture belong to its window.
@@ -18,7 +16,6 @@ pub(super) struct Projector<'a> {
     to_camera: DMat3,
     /// The eye; for parallel rays the anchor of the picture's centre.
     origin: DVec3,
-    near: f64,
     /// How far f32 may put a ray's positions from where they are: in voxels; and as [`Projector::camera`] counts.
     rounding: DVec3,
     camera_rounding: DVec3,
@@ -31,13 +28,13 @@ impl<'a> Projector<'a> {
         let is_parallel = rays.pixel == 0.0;
         let [right, down] = if is_parallel { [rays.anchor[1], rays.anchor[2]] } else { [right, down] };
         let to_camera = DMat3::from_cols(right, down, forward).inverse();
-        let rounding = rounding(plan);
+        let (low, high) = (plan.domain.min - rays.center, plan.domain.max - rays.center);
+        let rounding = rays.most_rounding(low.abs().max(high.abs()));
         let [x, y, z] = [0, 1, 2].map(|axis| to_camera.row(axis).abs().dot(rounding));
         Projector {
             rays,
             to_camera,
             origin: rays.anchor[0] - forward * rays.anchor_depth,
-            near: NEAR * plan.sampling.step_world(),
             rounding,
             camera_rounding: DVec3::new(x, y, z),
         }
@@ -69,29 +66,30 @@ impl<'a> Projector<'a> {
         if self.rays.pixel == 0.0 { self.rays.anchor_past_start + self.rays.start } else { 0.0 }
     }
 
-    /// All of a window, in pixels, whose rays may meet a polygon: a little more than where it is seen. Nothing is behind the eye.
+    /// All of a window, in pixels, whose rays may meet a polygon: a little more than where it is seen. What is nearer to the eye's
+    /// plane than rounding is not there.
     ///
     /// A ray that f32 puts beside its pixel p by d meets the polygon in a point x that is seen at p + (d.xy - p d.z) / x.z. That is
     /// affine in 1 / x.z, which is affine in the picture: the hull of what its corners may be off by has all of them.
     pub(super) fn project(&self, polygon: &[DVec3], window: Window) -> Vec<DVec2> {
-        let camera: Vec<DVec3> = polygon.iter().map(|p| self.camera(*p)).collect();
         let (half, off) = (0.5 * self.rays.size.as_dvec2(), self.camera_rounding);
-        let squares: Vec<[DVec2; 2]> = match self.rays.pixel {
-            0.0 => camera.iter().map(|c| [c.truncate() + half, off.truncate() + GROWN]).collect(),
-            _ => {
-                let off = off.truncate() + half * off.z;
-                let before = clip(&camera, |c| c.z - self.near);
-                before.iter().map(|c| [c.truncate() / c.z + half, off / c.z + GROWN]).collect()
-            }
+        let is_parallel = self.rays.pixel == 0.0;
+        let camera: Vec<DVec3> = match is_parallel {
+            true => polygon.iter().map(|p| self.camera(*p).with_z(1.0)).collect(),
+            false => clip(&polygon.iter().map(|p| self.camera(*p)).collect::<Vec<_>>(), |c| c.z - off.z),
         };
-        let misses = |axis: usize| {
-            squares.iter().all(|[p, by]| p[axis] + by[axis] < window.low[axis])
-                || squares.iter().all(|[p, by]| p[axis] - by[axis] > window.high[axis])
+        let off = if is_parallel { off.truncate() } else { off.truncate() + half * off.z };
+        // Cut before it is divided by the depth, which may be next to nothing.
+        let (low, high) = (window.low - GROWN - half, window.high + GROWN - half);
+        let near = (0..2).fold(camera, |near, axis| {
+            let near = clip(&near, |c| c[axis] + off[axis] - low[axis] * c.z);
+            clip(&near, |c| high[axis] * c.z - (c[axis] - off[axis]))
+        });
+        let square = |c: &DVec3| {
+            let (p, by) = (c.truncate() / c.z + half, off / c.z + GROWN);
+            SQUARE.map(|corner| p + by * corner)
         };
-        if misses(0) || misses(1) {
-            return Vec::new();
-        }
-        let grown = hull(squares.iter().flat_map(|[p, by]| SQUARE.map(|corner| *p + *by * corner)).collect());
+        let grown = hull(near.iter().flat_map(square).collect());
         (0..2).fold(grown, |grown, axis| {
             let grown = clip(&grown, |p| p[axis] - window.low[axis]);
             clip(&grown, |p| window.high[axis] - p[axis])
@@ -120,16 +118,3 @@ impl Window {
 
 /// The corners of a square of side 2.
 const SQUARE: [DVec2; 4] = [DVec2::new(1.0, -1.0), DVec2::new(1.0, 1.0), DVec2::new(-1.0, 1.0), DVec2::new(-1.0, -1.0)];
-
-/// How far f32 may put the positions of any ray in the domain, in voxels: anchors are affine in the picture, so that no ray's
-/// terms are larger than those of the corners'.
-fn rounding(plan: &FramePlan) -> DVec3 {
-    let (rays, last) = (&plan.rays, plan.rays.size - 1);
-    let pixels = [UVec2::ZERO, last, UVec2::new(last.x, 0), UVec2::new(0, last.y), rays.size / 2];
-    let of = |pixel: UVec2| {
-        let ray = rays.ray(pixel.x, pixel.y);
-        let way = (0.5 * plan.domain.diagonal() + ray.anchor.length()) / ray.direction.length();
-        rays.rounding(&ray, ray.t_anchor.abs() + way)
-    };
-    pixels.map(of).into_iter().fold(DVec3::ZERO, DVec3::max)
-}

@@ -194,6 +194,18 @@ fn extremes() -> Vec<Case> {
             placed(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), placement).step(3e7)
         })
     };
+    // Along a slab from inside, looking down at a slant: the terms of a ray's direction cancel.
+    let slab = |(placement, _): (Placement, _)| {
+        let name = format!("bricks/slab-{}", placement.name());
+        picture(name, catches![ExtinctionScaled, AnchorHalfVoxel], move || {
+            let grid = Grid::axis_aligned(UVec3::new(250, 240, 18), DVec3::ONE).expect("a grid");
+            let eye = DVec3::new(120.0, 20.0, 12.3);
+            placed(hills(&grid, ScalarType::U16), soft(ScalarType::U16), placement)
+                .detail(Criterion::Distance { factor: 1.0 }, Downsampling::Average)
+                .lens(eye, eye + DVec3::new(0.2, 1.0, -0.6), 1.6)
+                .with(|s| s.division = Division::Brick)
+        })
+    };
     let all = || PLACEMENTS.into_iter();
     let both = [Division::Ray, Division::Brick].into_iter();
     let long = both.flat_map(|division| PLACEMENTS.map(|(placement, _)| (placement, division))).map(long);
@@ -202,5 +214,6 @@ fn extremes() -> Vec<Case> {
         .chain(all().map(in_a_face))
         .chain(all().map(wide))
         .chain(all().map(one_step))
+        .chain(all().map(slab))
         .collect()
 }

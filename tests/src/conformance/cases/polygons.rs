@@ -129,7 +129,7 @@ fn degenerate() -> Vec<Case> {
     let magnified =
         move |p| polygons(large(), soft(ScalarType::U16), p).lens(DVec3::new(-40.0, -70.0, 41.0), center, 2e-5);
     let eye_in_a_corner = move |p| mixed(p).eye(DVec3::splat(30.5) + 1e-5, center + 20.0);
-    let steps = |p| polygons(large(), soft(ScalarType::U16), p).step(3e7);
+    let steps = |p| polygons(large(), soft(ScalarType::U16), p).step(1e12);
     let both = || catches![PolygonsReversed, ExitsMissing];
     let mut cases = each("surfaces-on-faces", both(), on_faces);
     cases.extend(each("surfaces-on-faces-parallel", both(), on_faces_parallel));
