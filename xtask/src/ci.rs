@@ -76,7 +76,7 @@ fn steps() -> Result<Vec<Step>> {
     let claims = [&of_lamar[..], &["--part", "selection,seams,shells"]].concat();
     steps.push(step("claims of LaMar, Hamann and Joy 1999", move || xtask(&claims).run()));
     let views =
-        [&of_lamar[..], &["--part", "views", "--views", "4", "--volume-side", "96", "--size", "96x96"]].concat();
+        [&of_lamar[..], &["--part", "views", "--views", "4", "--volume-side", "128", "--size", "48x48"]].concat();
     steps.push(step("views of a pixel's error", move || xtask(&views).run()));
     let rows = ["--part", "table", "--only", "engine", "--sides", "32", "--size", "96x96", "--frames", "1"];
     let table = [&of_lamar[..], &rows].concat();

@@ -12,7 +12,7 @@ use brickfield_shaders::{Entry, ShaderLibrary, Variant, passes, pixels_per_pass,
 use wgpu::{BufferUsages, Features};
 
 use crate::buffer::Reused;
-use crate::clock::Clock;
+use crate::clock::{Clock, milliseconds_since};
 use crate::device::Device;
 use crate::picture::{self, Maker};
 use crate::pipeline::{Pipeline, Pipelines, Program};
@@ -110,7 +110,7 @@ impl WgpuBackend {
             self.scene.uniforms.write(&self.device, bytemuck::bytes_of(&uniforms.in_pass(&pass)))?;
             dispatch(&self.device, pipeline, &self.scene, groups, clock)?;
             self.device.wait("rendering")?;
-            wall_ms += milliseconds(started);
+            wall_ms += milliseconds_since(started);
             let pass_ms = clock.map(|c| c.milliseconds(&self.device)).transpose()?;
             device_ms = device_ms.zip(pass_ms).map(|(sum, ms)| sum + ms);
         }
@@ -157,7 +157,7 @@ impl Backend for WgpuBackend {
         }
         self.device.queue.submit([]);
         self.device.wait("uploading")?;
-        let upload_ms = milliseconds(started);
+        let upload_ms = milliseconds_since(started);
         let (device_ms, wall_ms) = match &plan.proxy {
             None => self.march(plan, uniforms)?,
             Some(proxy) => self.polygons.draw(&self.device, pipeline, &self.scene, proxy, self.clock.as_ref())?,
@@ -165,7 +165,7 @@ impl Backend for WgpuBackend {
         let started = Instant::now();
         let Some(picture) = &self.scene.picture else { return Err(unbound()) };
         let image = picture.read(&self.device, &mut self.staging)?;
-        Ok(Frame { image, timing: Timing { upload_ms, device_ms, wall_ms, read_back_ms: milliseconds(started) } })
+        Ok(Frame { image, timing: Timing { upload_ms, device_ms, wall_ms, read_back_ms: milliseconds_since(started) } })
     }
 
     fn evaluate(
@@ -227,8 +227,4 @@ fn dispatch(
         }
         device.queue.submit([encoder.finish()]);
     })
-}
-
-pub(crate) fn milliseconds(since: Instant) -> f64 {
-    since.elapsed().as_secs_f64() * 1e3
 }

@@ -1,5 +1,7 @@
 //! Device time by timestamp queries.
 
+use std::time::Instant;
+
 use brickfield_frame::RenderError;
 
 use crate::device::Device;
@@ -72,4 +74,9 @@ impl Clock {
         let nanoseconds = ticks[1].saturating_sub(ticks[0]) as f64 * f64::from(device.queue.get_timestamp_period());
         Ok(nanoseconds * 1e-6)
     }
+}
+
+/// Milliseconds of the host's clock.
+pub(crate) fn milliseconds_since(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
 }

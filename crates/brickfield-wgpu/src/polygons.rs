@@ -6,9 +6,8 @@ use std::time::Instant;
 use brickfield_frame::{Held, ProxyGeometry, RenderError};
 use wgpu::BufferUsages;
 
-use crate::backend::milliseconds;
 use crate::buffer::Reused;
-use crate::clock::Clock;
+use crate::clock::{Clock, milliseconds_since};
 use crate::device::Device;
 use crate::pipeline::{Pipeline, Program};
 use crate::scene::{Scene, unbound};
@@ -60,7 +59,7 @@ impl Polygons {
             let batch_ms = clock.map(|c| c.milliseconds(device)).transpose()?;
             device_ms = device_ms.zip(batch_ms).map(|(sum, ms)| sum + ms);
         }
-        Ok((device_ms, milliseconds(started)))
+        Ok((device_ms, milliseconds_since(started)))
     }
 
     fn draw_batch(

@@ -52,6 +52,53 @@ pub(super) fn reference(tree: &BrickTree, scene: &Scene) -> Result<Discrete, Lam
     Ok(discrete(&prepare(tree, &complete, &mut Residency::default())?))
 }
 
+/// Two scenes of one tree on one backend, which take turns.
+pub(super) struct Duel {
+    pub(super) first: Outcome,
+    pub(super) second: Outcome,
+    /// The first's time over the second's: median over the rounds.
+    pub(super) ratio: f64,
+    /// Rounds, of one frame of each.
+    pub(super) n_rounds: usize,
+}
+
+/// One of them.
+pub(super) struct Outcome {
+    pub(super) image: Image<f32>,
+    pub(super) drawn: Drawn,
+    /// Whole frames.
+    pub(super) ms: Spread,
+    /// Their part before the backend's: selection, order, polygons.
+    pub(super) prepare_ms: Spread,
+}
+
+/// Ratios closer to 1 are in doubt, and measured further.
+const IN_DOUBT: std::ops::Range<f64> = 1.0 / 1.15..1.15;
+/// Most rounds, for each that is asked for.
+const MOST_ROUNDS: u32 = 5;
+
+/// At least `n_rounds` rounds, and up to [`MOST_ROUNDS`] times as many while it is in doubt which is faster.
+pub(super) fn duel(
+    tree: &BrickTree,
+    scenes: &[Scene; 2],
+    backend: &mut dyn Backend,
+    n_rounds: u32,
+) -> Result<Duel, LamarError> {
+    let [mut first, mut second] = [0, 1].map(|i| Contestant::new(tree, &scenes[i]));
+    let mut ratios = Vec::new();
+    loop {
+        let last = [first.frame(backend)?, second.frame(backend)?];
+        ratios.push(first.ms[ratios.len()] / second.ms[ratios.len()]);
+        let (n, ratio) = (ratios.len() as u32, median(ratios.clone()));
+        let [a, b] = last;
+        // Of the same bricks neither is faster.
+        let is_open = IN_DOUBT.contains(&ratio) && a.1 != b.1;
+        if n >= n_rounds && (n >= MOST_ROUNDS * n_rounds || !is_open) {
+            return Ok(Duel { first: first.outcome(a), second: second.outcome(b), ratio, n_rounds: ratios.len() });
+        }
+    }
+}
+
 /// One scene on one backend.
 pub(super) struct Contestant<'a> {
     tree: &'a BrickTree,
@@ -86,14 +133,8 @@ impl<'a> Contestant<'a> {
         Ok((image, drawn))
     }
 
-    /// Whole frames.
-    pub(super) fn spread(&self) -> Spread {
-        spread(&self.ms)
-    }
-
-    /// Their part before the backend's: selection, order, polygons.
-    pub(super) fn prepare_spread(&self) -> Spread {
-        spread(&self.prepare_ms)
+    fn outcome(self, (image, drawn): (Image<f32>, Drawn)) -> Outcome {
+        Outcome { image, drawn, ms: spread(&self.ms), prepare_ms: spread(&self.prepare_ms) }
     }
 }
 

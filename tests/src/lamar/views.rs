@@ -8,7 +8,7 @@ use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{BrickSide, Camera, Grid, Projection, ScalarType};
 use serde::Serialize;
 
-use super::measure::{Contestant, Distance, Drawn, Judge, Spread, distance};
+use super::measure::{Distance, Drawn, Judge, Spread, distance, duel};
 use super::scenes::{geometries, scene, tree};
 use super::{LamarArgs, LamarError, Missed, print};
 use crate::compare::rivals::Rivals;
@@ -20,6 +20,8 @@ struct Row {
     backend: &'static str,
     full: (Drawn, Spread),
     pixel: (Drawn, Spread),
+    /// The time of full resolution over that of a pixel's error: the median over rounds in which they took turns.
+    ratio: f64,
     error: Distance,
     /// Why the picture of a pixel's error is not within the rule of its own cut's f64 reference.
     complaint: Option<String>,
@@ -75,21 +77,16 @@ fn of_view(
     view: u32,
     (scenes, judge): (&[Scene; 2], &Judge),
 ) -> Result<Row, LamarError> {
-    let mut contestants = [0, 1].map(|i| Contestant::new(tree, &scenes[i]));
-    let mut last = [None, None];
-    for _ in 0..args.frames {
-        for (contestant, last) in contestants.iter_mut().zip(&mut last) {
-            *last = Some(contestant.frame(backend)?);
-        }
-    }
-    let [Some((full, full_drawn)), Some((pixel, pixel_drawn))] = last else { unreachable!("at least one frame") };
+    let duel = duel(tree, scenes, backend, args.frames)?;
+    let (full, pixel) = (duel.first, duel.second);
     Ok(Row {
         view,
         backend: backend.describe().backend,
-        full: (full_drawn, contestants[0].spread()),
-        pixel: (pixel_drawn, contestants[1].spread()),
-        error: distance(&pixel, &full.map(f64::from))?,
-        complaint: judge.complaint(&pixel),
+        full: (full.drawn, full.ms),
+        pixel: (pixel.drawn, pixel.ms),
+        ratio: duel.ratio,
+        error: distance(&pixel.image, &full.image.map(f64::from))?,
+        complaint: judge.complaint(&pixel.image),
     })
 }
 
@@ -106,7 +103,7 @@ fn line(row: &Row) -> String {
         megabytes(pixel),
         full_ms.median,
         pixel_ms.median,
-        full_ms.median / pixel_ms.median,
+        row.ratio,
         row.error.max,
         row.error.rmse,
         row.error.delta_e_mean,
@@ -131,7 +128,7 @@ fn summary(rows: &[Row]) -> Result<Vec<Missed>, LamarError> {
         let own = || rows.iter().filter(|r| r.backend == name);
         let ratio = |f: &dyn Fn(&Row) -> f64| crate::metrics::median(own().map(f).collect());
         let bricks = ratio(&|r| r.pixel.0.n_bricks as f64 / r.full.0.n_bricks.max(1) as f64);
-        let time = ratio(&|r| r.full.1.median / r.pixel.1.median);
+        let time = ratio(&|r| r.ratio);
         let worst = own().map(|r| r.error.max).fold(0.0, f64::max);
         let rmse = ratio(&|r| r.error.rmse);
         print(&format!(

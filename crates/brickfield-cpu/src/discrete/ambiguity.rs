@@ -2,8 +2,7 @@
 //!
 //! **Distance.** How far a position is off along an axis says [`RayFrame::rounding`](brickfield_frame::RayFrame::rounding).
 //!
-//! Where segments end with their brick, a ray that runs along a face within that distance may be in either block, and has the
-//! segments of that one.
+//! Where segments end with their brick, a ray that runs along a face within that distance may be in either block (`straying`).
 //!
 //! **Value.** The interpolated value moves by at most that distance times the range of its cell, and by eight more
 //! roundings of the numbers that decoding adds up.
@@ -18,9 +17,10 @@ use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, PlanRay};
 use brickfield_optics::{Segment, alpha, transmittance};
 
 use super::field::{Field, Stored};
-use super::walk::{Part, clip, middle, parts, parts_in_block, segments, whole};
+use super::straying::straying;
+use super::walk::{Part, clip, middle, parts, segments, whole};
 use super::{part_values, relative, segment};
-use crate::blocks::{Blocks, Crossing};
+use crate::blocks::Blocks;
 
 /// How far the cosines of a ray's angles to planes may be off: a few roundings of numbers below 1.
 pub(super) const TIE: f64 = 1e-6;
@@ -89,7 +89,7 @@ impl Ambiguity {
         };
         let straying = match sampling.division() {
             Division::Ray => 0.0,
-            Division::Brick => self.straying(field, ray, span, delta),
+            Division::Brick => straying(field, ray, span, delta, (self.max_extinction, self.coarsest)),
         };
         appearing + changing + straying
     }
@@ -137,57 +137,6 @@ impl Ambiguity {
         }
     }
 
-    /// The change by a ray that runs along the face of a block within rounding: it may be in the block beside it, and cross the face,
-    /// which cuts a segment, anywhere.
-    ///
-    /// Piece by piece, between surfaces of the coarsest level: the light that the ray has there, against what it has in any of
-    /// the blocks beside it; and twice what a cut through the middle of any segment changes. What is too short to hold 1e-5 is left out.
-    fn straying<S: Stored>(&self, field: &Field<S>, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
-        const LITTLE: f64 = 1e-5;
-        let plan = field.plan;
-        let own: Vec<Crossing> = Blocks::new(plan, ray, span).collect();
-        let (mut bound, mut least_depth) = (0.0, 0.0f64);
-        for crossing in &own {
-            let b = plan.block_box(crossing.cell);
-            let (mut change, mut least) = (0.0, 0.0);
-            for along in along_faces(ray, &b, crossing.span, delta, LITTLE / self.max_extinction) {
-                let ways = ways_beside(plan, ray, along, delta);
-                let (along_change, along_less) = self.change_along(field, ray, along, (&own, &ways));
-                change += along_change;
-                least += along_less;
-            }
-            bound += transmittance(least_depth) * change;
-            least_depth += (light(field, ray, &own, crossing.span).sum.depth - least).max(0.0);
-        }
-        bound
-    }
-
-    /// How much the light along a span may change if blocks are crossed in another way, and by how much its depth may be less.
-    fn change_along<S: Stored>(
-        &self,
-        field: &Field<S>,
-        ray: &PlanRay,
-        along: Span,
-        (own, ways): (&Vec<Crossing>, &[Vec<Crossing>]),
-    ) -> (f64, f64) {
-        let step = field.plan.sampling.step_world() * f64::from(self.coarsest.stride()) * ray.stretch;
-        let (mut change, mut less, mut by_cut) = (0.0, 0.0, 0.0f64);
-        for piece in segments(along, step) {
-            let piece = Span { start: piece.start.max(along.start), end: piece.end.min(along.end) };
-            let here = light(field, ray, own, piece);
-            let (mut most, mut least) = (0.0f64, here.sum.depth);
-            for there in ways.iter().map(|way| light(field, ray, way, piece)) {
-                most = most.max(difference(&here.sum, &there.sum));
-                least = least.min(there.sum.depth);
-                by_cut = by_cut.max(there.by_cut);
-            }
-            by_cut = by_cut.max(here.by_cut);
-            change += most;
-            less += here.sum.depth - least;
-        }
-        (change + 2.0 * by_cut, less)
-    }
-
     /// Whether a node at `q` could be close to a jump; quick, and never wrongly no.
     fn may_be_close<S: Stored>(&self, field: &Field<S>, part: Part, q: DVec3, delta: DVec3) -> bool {
         let q = field.clamped(q);
@@ -226,58 +175,6 @@ impl Ambiguity {
             values.extend([Some(jump.next_down()), Some(*jump)]);
         }
     }
-}
-
-/// Where a ray is within `delta` of a face of a box, for longer than `least`.
-fn along_faces(ray: &PlanRay, b: &Aabb, span: Span, delta: DVec3, least: f64) -> Vec<Span> {
-    let near = |(axis, face): (usize, f64)| {
-        let (d, slab) = (ray.direction[axis], [face - delta[axis], face + delta[axis]]);
-        let at = slab.map(|p| (p - ray.anchor[axis]) / d + ray.t_anchor);
-        match d == 0.0 {
-            true if slab[0] <= ray.anchor[axis] && ray.anchor[axis] <= slab[1] => span,
-            true => Span { start: 0.0, end: 0.0 },
-            false => Span { start: span.start.max(at[0].min(at[1])), end: span.end.min(at[0].max(at[1])) },
-        }
-    };
-    let faces = (0..3).flat_map(|axis| [(axis, b.min[axis]), (axis, b.max[axis])]);
-    faces.map(near).filter(|along| along.end - along.start > least).collect()
-}
-
-/// The blocks along a span, as rays cross them that are off by `delta`: to all sides.
-fn ways_beside(plan: &FramePlan, ray: &PlanRay, along: Span, delta: DVec3) -> Vec<Vec<Crossing>> {
-    let sides = [-1.0, 1.0];
-    let signs = sides.into_iter().flat_map(|x| sides.into_iter().flat_map(move |y| sides.map(|z| DVec3::new(x, y, z))));
-    let beside = |sign: DVec3| PlanRay { anchor: ray.anchor + sign * delta, ..*ray };
-    signs.map(|sign| Blocks::new(plan, &beside(sign), along).collect()).collect()
-}
-
-/// The light of a piece of a ray, and the most that a cut through the middle of one of its segments changes.
-struct Light {
-    sum: Segment,
-    by_cut: f64,
-}
-
-/// The light of a piece of a ray that crosses blocks.
-fn light<S: Stored>(field: &Field<S>, ray: &PlanRay, crossings: &[Crossing], piece: Span) -> Light {
-    let mut light = Light { sum: Segment::default(), by_cut: 0.0 };
-    let of = |part: Part| segment(field.plan, part_values(field, ray, part), part.length);
-    for crossing in crossings {
-        let span = Span { start: piece.start.max(crossing.span.start), end: piece.end.min(crossing.span.end) };
-        for part in parts_in_block(field.plan, ray, span, crossing.cell) {
-            let (whole, mut halves) = (of(part), Segment::default());
-            part.halves().into_iter().for_each(|half| push(&mut halves, &of(half)));
-            light.by_cut = light.by_cut.max(difference(&whole, &halves));
-            push(&mut light.sum, &whole);
-        }
-    }
-    light
-}
-
-/// Adds a segment behind others.
-fn push(sum: &mut Segment, behind: &Segment) {
-    let through = transmittance(sum.depth);
-    sum.emission = std::array::from_fn(|c| sum.emission[c] + through * behind.emission[c]);
-    sum.depth += behind.depth;
 }
 
 /// Whether a point is within `delta` of a box's surface.
@@ -347,7 +244,7 @@ pub(super) fn spread(plan: &FramePlan, nodes: &[Values], part: Part) -> (f64, f6
     (change, least)
 }
 
-fn difference(a: &Segment, b: &Segment) -> f64 {
+pub(super) fn difference(a: &Segment, b: &Segment) -> f64 {
     let emission = a.emission.iter().zip(b.emission).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
     emission + (transmittance(a.depth) - transmittance(b.depth)).abs()
 }

@@ -6,6 +6,7 @@
 mod ambiguity;
 mod field;
 mod rounding;
+mod straying;
 mod walk;
 
 use brickfield_core::glam::{DVec3, UVec2};
