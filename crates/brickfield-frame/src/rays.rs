@@ -164,7 +164,7 @@ impl RayFrame {
         let corner = 0.5 * self.size.as_dvec2();
         let anchor = magnitude(&self.anchor, corner);
         let [forward, right, down] = self.direction;
-        // Perspective: of a direction across, x pixels weigh no more than x pixel / (x pixel).
+        // Normalised, no part of a direction is longer than 1.
         let direction = match self.pixel {
             0.0 => forward.abs(),
             pixel => magnitude(&self.direction, corner).min(forward.abs() + (right.abs() + down.abs()) / pixel),
@@ -172,7 +172,7 @@ impl RayFrame {
         let way = (half.length() + anchor.length()) / self.least_voxels_per_unit();
         let corners = [(0, 0), (self.size.x - 1, 0), (0, self.size.y - 1), (self.size.x - 1, self.size.y - 1)];
         let rays = corners.into_iter().chain([(self.size.x / 2, self.size.y / 2)]).map(|(x, y)| self.ray(x, y));
-        // Rays meet their planes at a slant of at most 1 / sqrt 3.
+        // Object-aligned planes are met at a cosine of 1 / sqrt 3 or more.
         let t_anchor = rays.map(|ray| ray.t_anchor.abs()).fold(2.0 * way, f64::max);
         (self.center.abs() + anchor + direction * (way + 2.0 * t_anchor)) * ROUNDING
     }

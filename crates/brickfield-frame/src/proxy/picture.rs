@@ -5,6 +5,8 @@ use brickfield_core::glam::{DMat3, DVec2, DVec3};
 use super::polygon::{clip, hull};
 use crate::{FramePlan, RayFrame};
 
+/// Nearer to the eye's plane than this share of what f32 rounds, nothing is drawn.
+const NEAR: f64 = 1e-4;
 /// By how many pixels polygons are grown: more than rasterisers round.
 pub(super) const GROWN: f64 = 0.125;
 /// How many pixels around the picture belong to its window.
@@ -66,8 +68,8 @@ impl<'a> Projector<'a> {
         if self.rays.pixel == 0.0 { self.rays.anchor_past_start + self.rays.start } else { 0.0 }
     }
 
-    /// All of a window, in pixels, whose rays may meet a polygon: a little more than where it is seen. What is nearer to the eye's
-    /// plane than rounding is not there.
+    /// All of a window, in pixels, whose rays may meet a polygon: a little more than where it is seen. What lies nearer to the
+    /// eye's plane than [`NEAR`] of rounding is left out.
     ///
     /// A ray that f32 puts beside its pixel p by d meets the polygon in a point x that is seen at p + (d.xy - p d.z) / x.z. That is
     /// affine in 1 / x.z, which is affine in the picture: the hull of what its corners may be off by has all of them.
@@ -76,7 +78,7 @@ impl<'a> Projector<'a> {
         let is_parallel = self.rays.pixel == 0.0;
         let camera: Vec<DVec3> = match is_parallel {
             true => polygon.iter().map(|p| self.camera(*p).with_z(1.0)).collect(),
-            false => clip(&polygon.iter().map(|p| self.camera(*p)).collect::<Vec<_>>(), |c| c.z - off.z),
+            false => clip(&polygon.iter().map(|p| self.camera(*p)).collect::<Vec<_>>(), |c| c.z - NEAR * off.z),
         };
         let off = if is_parallel { off.truncate() } else { off.truncate() + half * off.z };
         // Cut before it is divided by the depth, which may be next to nothing.
