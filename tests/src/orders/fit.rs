@@ -48,7 +48,7 @@ impl Row {
 }
 
 /// The least-squares slope of log error over log parameter.
-pub fn fit(errors: &[(f64, f64)]) -> f64 {
+fn fit(errors: &[(f64, f64)]) -> f64 {
     let logs: Vec<(f64, f64)> = errors.iter().map(|(h, e)| (h.log2(), e.log2())).collect();
     let n = logs.len() as f64;
     let mean = logs.iter().fold((0.0, 0.0), |m, l| (m.0 + l.0 / n, m.1 + l.1 / n));
