@@ -46,7 +46,7 @@ pub enum PrepareError {
         "about {n_polygons:.1e} polygons; at most {limit} are possible: take a larger step, larger bricks or a coarser level"
     )]
     TooManyPolygons { n_polygons: f64, limit: u32 },
-    #[error("{n_facets} facets of {facet_pixels} pixels; at most {limit} are possible: take larger facets")]
+    #[error("{n_facets} facets with sides of {facet_pixels} px; at most {limit} are possible: take larger facets")]
     TooManyFacets { n_facets: u32, facet_pixels: u32, limit: u32 },
     #[error(transparent)]
     Sampling(#[from] SamplingError),

@@ -122,6 +122,13 @@ impl Part {
     }
 }
 
+impl Part {
+    /// Whether it reads real volumes.
+    pub(super) const fn needs_data(self) -> bool {
+        matches!(self, Part::Table | Part::Downsampling | Part::Memory | Part::Figures)
+    }
+}
+
 impl LamarArgs {
     /// The parts to be run, each once.
     pub fn parts(&self) -> Vec<Part> {

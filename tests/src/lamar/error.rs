@@ -12,6 +12,8 @@ use crate::compare::CompareError;
 pub enum LamarError {
     #[error("no data: set BRICKFIELD_DATA (or --data) to the folder of real volumes")]
     NoData,
+    #[error("no data: {} is not a folder; BRICKFIELD_DATA (or --data) names that of real volumes", path.display())]
+    NoFolder { path: PathBuf },
     #[error("--only {only}: no data set's path contains that; there are {known}")]
     NoSuchData { only: String, known: String },
     #[error(transparent)]
@@ -49,7 +51,10 @@ impl LamarError {
     pub fn status(&self) -> u8 {
         match self {
             LamarError::Backends(e) => e.status(),
-            LamarError::NoData | LamarError::NoSuchData { .. } | LamarError::Prepare(_) => 2,
+            LamarError::NoData
+            | LamarError::NoFolder { .. }
+            | LamarError::NoSuchData { .. }
+            | LamarError::Prepare(_) => 2,
             _ => 1,
         }
     }

@@ -56,6 +56,7 @@ impl Missed {
 /// # Errors
 /// Data or a folder that cannot be had, a scene that is refused, a backend that fails.
 pub fn lamar(args: &LamarArgs) -> Result<Findings, LamarError> {
+    scenes::check_data(args)?;
     std::fs::create_dir_all(&args.out).map_err(|source| LamarError::Out { path: args.out.clone(), source })?;
     let mut rivals = Rivals::open(&args.backends, args.adapter.as_deref());
     rivals.check_required(&args.require)?;
@@ -82,6 +83,10 @@ pub fn lamar(args: &LamarArgs) -> Result<Findings, LamarError> {
         };
         findings.missed.extend(missed);
     }
+    print(&match findings.missed.len() {
+        0 => "\nEverything that is claimed of these parts holds.".to_owned(),
+        n => format!("\nOf what is claimed, {n} does not hold."),
+    })?;
     Ok(findings)
 }
 

@@ -11,7 +11,7 @@ use brickfield::{Scene, Technique, Viewpoint};
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{BrickSide, Camera, Grid, IndexPos, Projection, Ray, TransferFunction, Volume, WorldPos};
 
-use super::{LamarArgs, LamarError};
+use super::{LamarArgs, LamarError, Part};
 
 /// The data sets, as paths below the folder of real volumes.
 const DATA: [&str; 3] = ["ct/engine.vti", "ct/aneurism.vti", "ct/LIDC2.mha"];
@@ -30,6 +30,17 @@ pub(super) struct Geometry {
     pub(super) name: &'static str,
     pub(super) placement: Placement,
     pub(super) technique: Technique,
+}
+
+/// Whether the data that the parts need are there, and what `--only` says is one of them.
+pub(super) fn check_data(args: &LamarArgs) -> Result<(), LamarError> {
+    if args.only.is_none() && !args.parts().into_iter().any(Part::needs_data) {
+        return Ok(());
+    }
+    match &args.data {
+        Some(folder) if !folder.is_dir() => Err(LamarError::NoFolder { path: folder.clone() }),
+        _ => exhibits(args).map(drop),
+    }
 }
 
 /// The data sets that are asked for, one by one.

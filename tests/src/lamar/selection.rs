@@ -35,7 +35,7 @@ pub(super) fn run(_: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
     let (least, most) = (counts.keys().next().copied().unwrap_or(0), counts.keys().last().copied().unwrap_or(0));
     let words: Vec<String> = counts.iter().map(|(tiles, points)| format!("{tiles}: {points}")).collect();
     print(&format!(
-        "\nFigure 5: 16 x 16 tiles in five levels, points at eighths of a tile: {least} to {most} tiles (13 to 61 expected; the figure has 49).\n\
+        "\nFigure 5: 16 x 16 tiles in five levels, points at eighths of a tile: {least} to {most} tiles (expected: 13 to 61, and 49, as in the figure, among them).\n\
          Points by their number of tiles: {}",
         words.join(", ")
     ))?;

@@ -54,8 +54,8 @@ pub struct ViewOptions {
     #[allow(missing_docs)]
     pub transfer: String,
     /// Which resolution; of several, separated by commas or each with its own --lod, all must be satisfied:
-    /// full, a level (0 is the finest), distance[=FACTOR] (a part's distance from the eye above FACTOR diagonals, 1),
-    /// poi=X:Y:Z or poi=X:Y:Z:FACTOR (its distance from a point of the world), fov[=FRACTION] (its angle below FRACTION of
+    /// full, a level (0 is the finest), distance[=FACTOR] (from the eye to a part's centre more than FACTOR of
+    /// its own diagonals, 1), poi=X:Y:Z or poi=X:Y:Z:FACTOR (the same from a point of the world), fov[=FRACTION] (its angle below FRACTION of
     /// the field of view, 0.5), error=PIXELS (its voxels at most so large in the picture)
     #[arg(long, value_name = "LOD", default_value = "full", value_delimiter = ',', value_parser = values::criterion,
           allow_hyphen_values = true)]
