@@ -90,6 +90,13 @@ pub fn lamar(args: &LamarArgs) -> Result<Findings, LamarError> {
     Ok(findings)
 }
 
+/// Rows as a JSON file of the output folder.
+fn write_rows<R: serde::Serialize>(args: &LamarArgs, name: &str, rows: &[R]) -> Result<(), LamarError> {
+    let path = args.out.join(name);
+    let json = serde_json::to_string_pretty(rows).expect("rows are plain data");
+    std::fs::write(&path, json).map_err(|source| LamarError::Out { path, source })
+}
+
 /// A line on standard output.
 fn print(line: &str) -> Result<(), LamarError> {
     say(&format!("{line}\n")).map_err(LamarError::Print)

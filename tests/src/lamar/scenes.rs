@@ -100,10 +100,15 @@ pub(super) fn geometries(args: &LamarArgs) -> [Geometry; 4] {
     ]
 }
 
+/// Whether a backend draws polygons as such.
+pub(super) fn rasterises(backend: &dyn Backend) -> bool {
+    backend.describe().backend != "cpu"
+}
+
 /// Those that a backend draws: without a rasteriser, only rays.
 pub(super) fn geometries_of(args: &LamarArgs, backend: &dyn Backend) -> impl Iterator<Item = Geometry> + use<> {
-    let casts_only = backend.describe().backend == "cpu";
-    geometries(args).into_iter().filter(move |g| !casts_only || g.technique == Technique::RayCasting)
+    let rasterises = rasterises(backend);
+    geometries(args).into_iter().filter(move |g| rasterises || g.technique == Technique::RayCasting)
 }
 
 /// A scene of an exhibit.

@@ -9,7 +9,7 @@ use brickfield::{Residency, Scene, prepare, prepare_selection};
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickId, BrickSide, Camera, Grid, Image, Optics, Projection, TransferFunction, Volume};
 
-use super::scenes::{Geometry, geometries, geometries_of, scene, tree};
+use super::scenes::{Geometry, geometries, geometries_of, rasterises, scene, tree};
 use super::{LamarArgs, LamarError, Missed, print};
 use crate::compare::rivals::Rivals;
 use crate::metrics::errors;
@@ -142,7 +142,7 @@ fn angles(
     )?;
     let geometry = geometries(args)[0];
     let mut missed = Vec::new();
-    for backend in rivals.present.iter_mut().filter(|b| b.describe().backend != "cpu") {
+    for backend in rivals.present.iter_mut().filter(|b| rasterises(b.as_ref())) {
         let mut ratios = Vec::new();
         for degrees in [0.0f64, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0] {
             let (sin, cos) = degrees.to_radians().sin_cos();
@@ -168,7 +168,7 @@ fn angles(
             missed.push(Missed::of_pictures(what));
         }
     }
-    if rivals.present.iter().all(|b| b.describe().backend == "cpu") {
+    if !rivals.present.iter().any(|b| rasterises(b.as_ref())) {
         missed.push(Missed::of_pictures("object-aligned planes: no backend with a rasteriser".to_owned()));
     }
     Ok(missed)

@@ -7,7 +7,7 @@ use brickfield::{Residency, Technique, prepare};
 use brickfield_core::{BrickSide, Image};
 
 use super::measure::reference;
-use super::scenes::{geometries, scene, tree};
+use super::scenes::{geometries, rasterises, scene, tree};
 use super::{LamarArgs, LamarError, Missed, print};
 use crate::compare::rivals::Rivals;
 use crate::metrics::errors;
@@ -32,7 +32,7 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
     let detail = [Criterion::Distance { factor: 4.0 }];
     let rays = scene(&args, &subject.transfer, subject.camera, geometries(&args)[3], &detail);
     let answer: Image<f64> = reference(&tree, &rays)?.image;
-    for backend in rivals.present.iter_mut().filter(|b| b.describe().backend != "cpu") {
+    for backend in rivals.present.iter_mut().filter(|b| rasterises(b.as_ref())) {
         let name = backend.describe().backend;
         let mut found = Vec::new();
         for facet_pixels in FACETS {
@@ -54,7 +54,7 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
             missed.push(Missed::of_pictures(format!("{name}: shells converge with {observed}, not 2 over 5")));
         }
     }
-    if rivals.present.iter().all(|b| b.describe().backend == "cpu") {
+    if !rivals.present.iter().any(|b| rasterises(b.as_ref())) {
         missed.push(Missed::of_pictures("shells: no backend with a rasteriser".to_owned()));
     }
     Ok(missed)

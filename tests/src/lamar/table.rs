@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::measure::{Distance, Drawn, Judge, Outcome, Spread, answer, distance, duel};
 use super::scenes::{Exhibit, Geometry, exhibits, geometries, geometries_of, scene, sides, tree, views};
-use super::{LamarArgs, LamarError, Missed, print};
+use super::{LamarArgs, LamarError, Missed, print, write_rows};
 use crate::compare::rivals::Rivals;
 
 /// A line of the table: one data set, view, tile size, geometry and backend.
@@ -73,9 +73,7 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
             }
         }
     }
-    let path = args.out.join("table.json");
-    let json = serde_json::to_string_pretty(&rows).expect("rows are plain data");
-    std::fs::write(&path, json).map_err(|source| LamarError::Out { path, source })?;
+    write_rows(args, "table.json", &rows)?;
     Ok(missed(&rows))
 }
 

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::measure::{Distance, Drawn, Judge, Spread, distance, duel};
 use super::scenes::{geometries, scene, tree};
-use super::{LamarArgs, LamarError, Missed, print};
+use super::{LamarArgs, LamarError, Missed, print, write_rows};
 use crate::compare::rivals::Rivals;
 use crate::volumes::{Phantom, phantom_of};
 
@@ -51,9 +51,7 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
             rows.push(row);
         }
     }
-    let path = args.out.join("views.json");
-    let json = serde_json::to_string_pretty(&rows).expect("rows are plain data");
-    std::fs::write(&path, json).map_err(|source| LamarError::Out { path, source })?;
+    write_rows(args, "views.json", &rows)?;
     summary(&rows)
 }
 

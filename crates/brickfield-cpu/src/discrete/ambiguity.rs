@@ -166,10 +166,9 @@ impl Ambiguity {
     fn beyond_jumps<S: Stored>(&self, field: &Field<S>, cell: UVec3, q: DVec3, delta: DVec3, values: &mut Values) {
         let (false, Some(at)) = (self.jumps.is_empty(), field.interpolation_cell(cell, q)) else { return };
         let Some(value) = field.in_block(cell, q) else { return };
-        let decode = field.plan.bricks.decode();
-        let gain = (decode.scale / field.plan.bricks.format().unit()).abs();
-        let (min, max) = at.samples.iter().fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(*v), b.max(*v)));
-        let magnitude = gain * min.abs().max(max.abs()) + decode.offset.abs() + self.jumps[0].abs();
+        let (gain, (min, max)) = (field.gain(), at.range());
+        let offset = field.plan.bricks.decode().offset;
+        let magnitude = gain * min.abs().max(max.abs()) + offset.abs() + self.jumps[0].abs();
         let reach = gain * (max - min) * delta.element_sum() + ROUNDING * magnitude;
         for jump in self.jumps.iter().filter(|j| (value - **j).abs() <= reach) {
             values.extend([Some(jump.next_down()), Some(*jump)]);

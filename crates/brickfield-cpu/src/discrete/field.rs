@@ -54,6 +54,13 @@ pub(super) struct Cell {
     pub(super) fraction: DVec3,
 }
 
+impl Cell {
+    /// Least and greatest of the samples.
+    pub(super) fn range(&self) -> (f64, f64) {
+        self.samples.iter().fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(*v), b.max(*v)))
+    }
+}
+
 impl<'a, S: Stored> Field<'a, S> {
     pub(super) fn new(plan: &'a FramePlan) -> Self {
         let n = plan.bricks.side().n_samples() as usize;
@@ -66,6 +73,11 @@ impl<'a, S: Stored> Field<'a, S> {
         let q = self.clamped(q);
         let cell = self.index_cell(q);
         self.in_block(cell, q)
+    }
+
+    /// Data values between two stored numbers, without sign.
+    pub(super) fn gain(&self) -> f64 {
+        (self.plan.bricks.decode().scale / self.plan.bricks.format().unit()).abs()
     }
 
     /// The position that the field is evaluated at.

@@ -24,7 +24,7 @@ use brickfield_optics::transmittance;
 use rayon::prelude::*;
 
 use super::ambiguity::{Values, spread};
-use super::field::{Cell, Field, Float32, Stored, Unorm8, Unorm16};
+use super::field::{Field, Float32, Stored, Unorm8, Unorm16};
 use super::relative;
 use super::walk::{Part, clip, parts};
 
@@ -83,7 +83,7 @@ fn of_pixel<S: Stored>(field: &Field<S>, at: UVec2, cause: Cause) -> f64 {
     let delta = plan.rays.rounding(at.x, at.y, ray, span.start.abs().max(span.end.abs())) / AT_WORST;
     let stray = |range: f64, stride: f64| match cause {
         Cause::Positions => range * delta.element_sum() / stride,
-        Cause::Filter { sub_texel_bits } => filtered(plan, range, sub_texel_bits),
+        Cause::Filter { sub_texel_bits } => filtered(field, range, sub_texel_bits),
     };
     let (mut bound, mut least_depth) = (0.0, 0.0);
     for part in parts(plan, ray, span) {
@@ -97,17 +97,12 @@ fn of_pixel<S: Stored>(field: &Field<S>, at: UVec2, cause: Cause) -> f64 {
 }
 
 /// How far filtering may move a value between samples of a range, in data values.
-fn filtered(plan: &FramePlan, range: f64, bits: u32) -> f64 {
+fn filtered<S: Stored>(field: &Field<S>, range: f64, bits: u32) -> f64 {
     let weights = 3.0 * (-f64::from(bits)).exp2() * range;
-    let by_code = plan.bricks.format() == SampleFormat::Unorm8 && bits < f32::MANTISSA_DIGITS - 1;
-    let code = if by_code { CODES * gain(plan) } else { 0.0 };
+    let by_code = field.plan.bricks.format() == SampleFormat::Unorm8 && bits < f32::MANTISSA_DIGITS - 1;
+    let code = if by_code { CODES * field.gain() } else { 0.0 };
     // Interpolation never leaves the cell's range by more than a code.
     (weights + code).min(range + code)
-}
-
-/// Data values between two stored numbers.
-fn gain(plan: &FramePlan) -> f64 {
-    (plan.bricks.decode().scale / plan.bricks.format().unit()).abs()
 }
 
 /// The values that a node at `q` may have; none where its block is transparent. `stray` takes the range of the samples around it, in
@@ -119,12 +114,8 @@ fn values<S: Stored>(field: &Field<S>, part: Part, q: DVec3, stray: impl Fn(f64,
         return vec![None];
     };
     let stride = f64::from(field.plan.index.at(cell).level().stride());
-    candidates(&field.plan.transfer, value, stray(gain(field.plan) * range(&at), stride))
-}
-
-fn range(cell: &Cell) -> f64 {
-    let (min, max) = cell.samples.iter().fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(*v), b.max(*v)));
-    max - min
+    let (min, max) = at.range();
+    candidates(&field.plan.transfer, value, stray(field.gain() * (max - min), stride))
 }
 
 /// The values at which extinction and colour are extreme: the node's own first, the ends, and both sides of knots between.
