@@ -17,6 +17,7 @@ use spawn::{Spawn, Tool, cargo};
 ///
 /// Start with `cargo xtask setup` on a new machine, then `cargo xtask compare`. Exit codes: 0 good, 1 something failed or
 /// is missing, 2 bad arguments; compare, conformance, orders, speed, test and bench pass on what the program that they run says.
+/// `cargo xtask compare --help` shows what can be chosen; so do those of conformance, orders and speed. They are built first.
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", after_help = ENVIRONMENT)]
 struct Options {
@@ -40,8 +41,7 @@ enum Command {
         yes: bool,
     },
     /// Compare methods and backends: error against run time
-    ///
-    /// `cargo xtask compare -- --help` shows what can be chosen.
+    #[command(disable_help_flag = true)]
     Compare(Passed),
     /// Run every test and every documentation example of the workspace
     ///
@@ -49,12 +49,14 @@ enum Command {
     Test(Passed),
     /// Hold every backend to the f64 answer
     ///
-    /// `--require cpu,wgpu,ash` makes an absent backend a failure; `--self-check` lets mutants loose on the cases;
-    /// `cargo xtask conformance -- --help` shows the rest.
+    /// `--require cpu,wgpu,ash` makes an absent backend a failure; `--self-check` lets mutants loose on the cases.
+    #[command(disable_help_flag = true)]
     Conformance(Passed),
     /// Measure the order of accuracy of every quadrature rule
+    #[command(disable_help_flag = true)]
     Orders(Passed),
     /// Measure what skipping saves, the CPU path against the GPU paths, an empty frame, the octree's build rate
+    #[command(disable_help_flag = true)]
     Speed(Passed),
     /// Run the benchmarks; arguments go to cargo bench
     Bench(Passed),

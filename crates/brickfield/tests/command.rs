@@ -143,7 +143,9 @@ fn bricks_that_show_nothing_are_boxes_only_if_all_are_asked_for() {
     let knots = format!(r#"{{"knots": [{}, {}]}}"#, knot(900.0, 0.0), knot(901.0, 1.0));
     std::fs::write(place.path().join("dark.json"), knots).unwrap();
     let said = place.rendered("a.exr", "|--transfer|dark.json|--show-bricks=all");
-    assert!(said.contains("boxes: none"), "{said}");
+    assert!(said.contains("\nboxes: none\n"), "{said}");
+    assert!(said.contains("\nfaint boxes, in which nothing is visible: 1 of level 0 (sky blue)\n"), "{said}");
+    assert!(!place.rendered("b.exr", "|--show-bricks").contains("faint"));
     assert!(place.pixels("|--transfer|dark.json|--show-bricks=drawn").iter().all(|c| *c == 0));
     assert!(place.pixels("|--transfer|dark.json|--show-bricks=all").iter().any(|c| *c > 0));
     // What is drawn is not drawn again.

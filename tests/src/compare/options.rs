@@ -21,7 +21,11 @@ use clap::{CommandFactory, FromArgMatches, Parser};
     after_help = "Examples:
   compare
   compare engine.vti --transfer ct-bone --camera \"front zoom=1.2\" --out engine
-  compare --backends cpu,ash --rules midpoint,gauss2 --steps 1,1/2,1/4 --seconds 20"
+  compare --backends cpu,ash --rules midpoint,gauss2 --steps 1,1/2,1/4 --seconds 20
+
+A paper's own comparisons have other options:
+  compare --paper lamar --help
+  compare --paper lamar --part selection,seams"
 )]
 pub struct CompareArgs {
     /// Volume file or folder; without it, the built-in phantom

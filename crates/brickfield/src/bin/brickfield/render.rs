@@ -27,14 +27,15 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         );
     }
     let mut frame = backend.render(&plan)?;
-    if let Some(boxes) = args.show_bricks {
-        frame.image = with_boxes(&frame.image, &subject, &scene, residency.bricks(), boxes);
+    let shown = args.show_bricks.map(|boxes| Shown::new(boxes, &subject, &scene, residency.bricks()));
+    if let Some(shown) = &shown {
+        frame.image = shown.over(&frame.image, &subject, &scene);
     }
     let attributes = attributes(args, backend.as_ref(), &scene, &plan);
     write_picture(&args.out, &frame.image, args.view.background.0, &attributes)?;
     print(&summary(backend.as_ref(), &scene, &plan, &frame))?;
-    if args.show_bricks.is_some() {
-        print(&legend(residency.bricks()))?;
+    if let Some(shown) = &shown {
+        print(&shown.legend())?;
     }
     check_validation(&backend.validation_messages())
 }
@@ -56,29 +57,46 @@ fn open(args: &RenderArgs) -> Result<Box<dyn Backend>, Failure> {
     Err(Failure::Backend(last.expect("at least one candidate")))
 }
 
-/// The picture with the boxes of the bricks that were drawn over it.
-fn with_boxes(image: &Image, subject: &Subject, scene: &Scene, drawn: &[BrickId], boxes: Boxes) -> Image {
-    let (grid, layout) = (subject.tree.grid(), subject.tree.layout());
-    let under = match boxes {
-        Boxes::Drawn => None,
-        Boxes::All => {
-            let selection = select_cut(layout, grid, &scene.view(), &scene.detail);
-            let drawn: HashSet<BrickId> = drawn.iter().copied().collect();
-            let others: Vec<_> = selection.drawn().filter(|id| !drawn.contains(id)).collect();
-            Some(show_bricks_faintly(image, &scene.camera, grid, layout, &others))
-        }
-    };
-    show_bricks(under.as_ref().unwrap_or(image), &scene.camera, grid, layout, drawn)
+/// The bricks whose boxes are shown over the picture.
+struct Shown<'a> {
+    drawn: &'a [BrickId],
+    /// Those that are selected but show nothing; `None` if their boxes were not asked for.
+    faint: Option<Vec<BrickId>>,
 }
 
-/// How many bricks of each level are shown, and in which colour.
-fn legend(bricks: &[BrickId]) -> String {
+impl<'a> Shown<'a> {
+    fn new(boxes: Boxes, subject: &Subject, scene: &Scene, drawn: &'a [BrickId]) -> Shown<'a> {
+        let selected_only = || {
+            let selection = select_cut(subject.tree.layout(), subject.tree.grid(), &scene.view(), &scene.detail);
+            let drawn: HashSet<BrickId> = drawn.iter().copied().collect();
+            selection.drawn().filter(|id| !drawn.contains(id)).collect()
+        };
+        Shown { drawn, faint: (boxes == Boxes::All).then(selected_only) }
+    }
+
+    fn over(&self, image: &Image, subject: &Subject, scene: &Scene) -> Image {
+        let (camera, grid, layout) = (&scene.camera, subject.tree.grid(), subject.tree.layout());
+        let under = self.faint.as_ref().map(|faint| show_bricks_faintly(image, camera, grid, layout, faint));
+        show_bricks(under.as_ref().unwrap_or(image), camera, grid, layout, self.drawn)
+    }
+
+    /// How many bricks of each level are shown, and in which colour.
+    fn legend(&self) -> String {
+        let drawn = format!("boxes: {}\n", by_level(self.drawn));
+        match &self.faint {
+            Some(faint) => format!("{drawn}faint boxes, in which nothing is visible: {}\n", by_level(faint)),
+            None => drawn,
+        }
+    }
+}
+
+fn by_level(bricks: &[BrickId]) -> String {
     let of_level = |level: Level| {
         let n = bricks.iter().filter(|id| id.level == level).count();
         (n > 0).then(|| format!("{n} of level {} ({})", level.0, LevelColor::of(level).name))
     };
     let levels: Vec<_> = (0..32).map(Level).filter_map(of_level).collect();
-    format!("boxes: {}\n", if levels.is_empty() { "none".to_owned() } else { levels.join(", ") })
+    if levels.is_empty() { "none".to_owned() } else { levels.join(", ") }
 }
 
 fn attributes(
