@@ -1,8 +1,6 @@
-//! Value histograms: the bins, their law, and fast counting.
+//! Value histograms: the bins and their law.
 
 use brickfield_core::{ScalarType, ValueRange};
-
-use crate::sample::Sample;
 
 /// Bins of a histogram.
 pub const N_BINS: usize = 32;
@@ -101,31 +99,6 @@ fn value_of_pattern(pattern: u16, scalar: ScalarType) -> f64 {
         ScalarType::I8 => f64::from(pattern as u8 as i8),
         ScalarType::I16 => f64::from(pattern as i16),
         _ => f64::from(pattern),
-    }
-}
-
-const LANES: usize = 4;
-
-/// Counts of one brick, spread over lanes so that equal neighbours do not wait for each other.
-#[derive(Default)]
-pub(crate) struct Tally([[u32; N_BINS]; LANES]);
-
-impl Tally {
-    #[inline]
-    pub(crate) fn count<T: Sample>(&mut self, row: &[T], table: &BinTable) {
-        let (groups, rest) = row.as_chunks::<LANES>();
-        for group in groups {
-            for (lane, v) in self.0.iter_mut().zip(group) {
-                lane[v.bin(table) % N_BINS] += 1;
-            }
-        }
-        for v in rest {
-            self.0[0][v.bin(table) % N_BINS] += 1;
-        }
-    }
-
-    pub(crate) fn histogram(&self) -> Histogram {
-        Histogram { counts: std::array::from_fn(|bin| self.0.iter().map(|lane| u64::from(lane[bin])).sum()) }
     }
 }
 

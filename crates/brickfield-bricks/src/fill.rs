@@ -3,9 +3,10 @@
 use brickfield_core::glam::UVec3;
 use brickfield_core::{BrickId, BrickLayout, ValueRange};
 
-use crate::bins::{BinTable, Histogram, Tally};
+use crate::bins::{BinTable, Histogram};
 use crate::downsample::Dense;
 use crate::sample::Sample;
+use crate::tally::Tally;
 
 /// Copies the brick's samples; those beyond the level's border replicate the border sample.
 pub(crate) fn copy_brick<T: Sample>(source: Dense<'_, T>, layout: &BrickLayout, id: BrickId, out: &mut [T]) {

@@ -6,6 +6,7 @@ mod downsample;
 mod fill;
 mod memory;
 mod sample;
+mod tally;
 mod tree;
 
 pub use bins::{Bins, Histogram, N_BINS};

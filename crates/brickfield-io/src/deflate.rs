@@ -5,7 +5,7 @@ use std::io::{self, BufRead, ErrorKind, Read};
 use flate2::bufread::{GzDecoder, ZlibDecoder};
 
 use crate::error::Damage;
-use crate::stored::note_surplus;
+use crate::note::note_surplus;
 use crate::{Note, ReadError};
 
 /// Deflate cannot expand by more than this (258 bytes from 2 bits).

@@ -205,6 +205,14 @@ fn chain(fault: &(dyn Error + 'static)) -> String {
     text
 }
 
+/// Holds the bytes that are there against those that are needed.
+pub(crate) fn check_length(what: &str, n_bytes: u64, expected_bytes: u128) -> Result<(), ReadError> {
+    if u128::from(n_bytes) < expected_bytes {
+        return Err(ReadError::Truncated { what: what.to_owned(), n_bytes, expected_bytes });
+    }
+    Ok(())
+}
+
 /// A number and what it counts: "1 byte", "2 bytes".
 pub(crate) fn counted(n: impl fmt::Display, one: &str, many: &str) -> String {
     let n = n.to_string();

@@ -11,13 +11,13 @@ use nifti::NiftiHeader;
 
 use crate::deflate::{check_ratio, inflate};
 use crate::error::Shown;
+use crate::error::check_length;
 use crate::files::{ByteSource, n_bytes_left, open_named};
 use crate::limits::{Shape, check_bytes};
 use crate::opened::Found;
 use crate::placement::{AXES, Placement, usable_spacing};
 use crate::rescale::{Rescale, rescaled, rescaled_type};
 use crate::samples::{allocate, append_binary, fill_named, skip};
-use crate::stored::check_length;
 use crate::{ByteOrder, DataFiles, Format, Limits, Note, Opened, ReadError, WorldFrame};
 
 const HEADER_BYTES: usize = 348;

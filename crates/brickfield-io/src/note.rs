@@ -113,3 +113,10 @@ impl fmt::Display for Note {
 fn were(n: usize) -> &'static str {
     if n == 1 { "was" } else { "were" }
 }
+
+/// Notes, once, that the data go on.
+pub(crate) fn note_surplus(notes: &mut Vec<Note>) {
+    if !notes.contains(&Note::SurplusData) {
+        notes.push(Note::SurplusData);
+    }
+}

@@ -6,9 +6,9 @@ use std::str::FromStr;
 use brickfield_core::{Scalar, ScalarType, Voxels, with_voxels};
 
 use crate::ReadError;
-use crate::limits::Shape;
 #[cfg(feature = "gzip")]
-use crate::stored::check_length;
+use crate::error::check_length;
+use crate::limits::Shape;
 
 /// Which end of a number comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -4,8 +4,9 @@ use std::io::{self, BufRead, SeekFrom};
 
 use brickfield_core::Voxels;
 
-use crate::error::bytes;
+use crate::error::{bytes, check_length};
 use crate::files::{ByteSource, n_bytes_left};
+use crate::note::note_surplus;
 #[cfg(feature = "gzip")]
 use crate::samples::skip;
 use crate::samples::{append_binary, append_text, least_text_bytes};
@@ -143,19 +144,6 @@ fn has_surplus(source: &mut dyn ByteSource, encoding: Encoding) -> Result<bool, 
     let left = n_bytes_left(source)?;
     // A line end after raw data is common and harmless.
     Ok(left > 2 && encoding == Encoding::Raw)
-}
-
-pub(crate) fn note_surplus(notes: &mut Vec<Note>) {
-    if !notes.contains(&Note::SurplusData) {
-        notes.push(Note::SurplusData);
-    }
-}
-
-pub(crate) fn check_length(what: &str, n_bytes: u64, expected_bytes: u128) -> Result<(), ReadError> {
-    if u128::from(n_bytes) < expected_bytes {
-        return Err(ReadError::Truncated { what: what.to_owned(), n_bytes, expected_bytes });
-    }
-    Ok(())
 }
 
 pub(crate) fn seek_forward(source: &mut dyn ByteSource, n_bytes: u64, what: &str) -> Result<(), ReadError> {

@@ -16,6 +16,7 @@ use brickfield_core::{Aabb, Level, Span};
 use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, PlanRay};
 use brickfield_optics::{Segment, alpha, transmittance};
 
+use super::change::{Values, difference, spread};
 use super::field::{Field, Stored};
 use super::straying::straying;
 use super::walk::{Part, clip, middle, parts, segments, whole};
@@ -37,9 +38,6 @@ pub(super) struct Ambiguity {
     /// The coarsest level of resident blocks.
     coarsest: Level,
 }
-
-/// The values that a node may have; the first is the one it has in f64.
-pub(super) type Values = Vec<Option<f64>>;
 
 impl Ambiguity {
     pub(super) fn new<S: Stored>(field: &Field<S>) -> Ambiguity {
@@ -223,27 +221,4 @@ fn has_several_kinds(plan: &FramePlan) -> bool {
 fn cells(low: UVec3, high: UVec3) -> impl Iterator<Item = UVec3> {
     let rows = move |z| (low.y..=high.y).map(move |y| (y, z));
     (low.z..=high.z).flat_map(rows).flat_map(move |(y, z)| (low.x..=high.x).map(move |x| UVec3::new(x, y, z)))
-}
-
-/// How far a segment's contribution may stray, and the least depth it may have.
-pub(super) fn spread(plan: &FramePlan, nodes: &[Values], part: Part) -> (f64, f64) {
-    let second: &[Option<f64>] = nodes.get(1).map_or(&[None], |v| v);
-    let own = segment(plan, [nodes[0][0], second[0]], part.length);
-    let (mut change, mut least) = (0.0f64, own.depth);
-    if nodes[0].len() * second.len() == 1 {
-        return (change, least);
-    }
-    for a in &nodes[0] {
-        for b in second {
-            let other = segment(plan, [*a, *b], part.length);
-            change = change.max(difference(&own, &other));
-            least = least.min(other.depth);
-        }
-    }
-    (change, least)
-}
-
-pub(super) fn difference(a: &Segment, b: &Segment) -> f64 {
-    let emission = a.emission.iter().zip(b.emission).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
-    emission + (transmittance(a.depth) - transmittance(b.depth)).abs()
 }

@@ -4,6 +4,7 @@
 //! span in the domain: nothing is jumped over and no ray ends early, so that those who do can be judged by it.
 
 mod ambiguity;
+mod change;
 mod field;
 mod rounding;
 mod straying;

@@ -23,7 +23,7 @@ use brickfield_frame::{FramePlan, SampleFormat};
 use brickfield_optics::transmittance;
 use rayon::prelude::*;
 
-use super::ambiguity::{Values, spread};
+use super::change::{Values, spread};
 use super::field::{Field, Float32, Stored, Unorm8, Unorm16};
 use super::relative;
 use super::walk::{Part, clip, parts};

@@ -10,7 +10,7 @@ use brickfield_core::{Aabb, Level, Span};
 use brickfield_frame::{FramePlan, PlanRay};
 use brickfield_optics::{Segment, transmittance};
 
-use super::ambiguity::difference;
+use super::change::difference;
 use super::field::{Field, Stored};
 use super::walk::{Part, parts_in_block, segments};
 use super::{part_values, segment};

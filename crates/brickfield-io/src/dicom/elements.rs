@@ -8,9 +8,9 @@ use dicom_dictionary_std::StandardDataDictionary;
 
 use crate::ReadError;
 use crate::error::bytes;
+use crate::error::check_length;
 use crate::files::{ByteSource, n_bytes_left};
 use crate::samples::fill;
-use crate::stored::check_length;
 
 /// How elements are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,12 +7,12 @@ use dicom_pixeldata::PixelDecoder;
 
 use super::slice::{Bits, Part, Slice, read_object};
 use crate::error::bytes;
+use crate::error::check_length;
 use crate::files::{DataFiles, open_named};
 use crate::guard::guarded;
 use crate::limits::{Limits, Shape, check_bytes};
 use crate::rescale::{Rescale, rescaled_type};
 use crate::samples::{allocate, append_binary, with_room};
-use crate::stored::check_length;
 use crate::{ByteOrder, Note, ReadError};
 
 /// The stored values of all slices, in the type that the first one has.

@@ -6,7 +6,7 @@ use std::io::{self, Read};
 
 use serde_json::Value;
 
-use super::metadata::numbers;
+use super::json::numbers;
 use crate::ReadError;
 use crate::deflate::damage;
 use crate::error::bytes;

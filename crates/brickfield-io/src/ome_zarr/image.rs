@@ -4,7 +4,7 @@ use brickfield_core::glam::DVec3;
 use serde_json::Value;
 use zarrs::storage::ReadableStorage;
 
-use super::metadata::read_json;
+use super::json::read_json;
 use crate::error::counted;
 use crate::placement::Placement;
 use crate::{Note, ReadError};

@@ -6,6 +6,7 @@
 mod bounds;
 mod chunks;
 mod image;
+mod json;
 mod metadata;
 
 use std::collections::BTreeMap;

@@ -7,9 +7,9 @@ use flate2::read::ZlibDecoder;
 use super::document::WordSize;
 use crate::deflate::{Unpacked, check_ratio};
 use crate::error::Damage;
+use crate::error::check_length;
 use crate::limits::Shape;
 use crate::samples::fill_named;
-use crate::stored::check_length;
 use crate::{ByteOrder, ReadError};
 
 /// Reads the words of a data header.

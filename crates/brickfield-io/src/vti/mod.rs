@@ -12,12 +12,12 @@ use std::io::{BufRead, Read, Seek, SeekFrom};
 use brickfield_core::glam::{DMat3, DVec3};
 use brickfield_core::{ScalarType, Voxels};
 
+use crate::error::check_length;
 use crate::files::{ByteSource, n_bytes_left};
 use crate::limits::Shape;
 use crate::opened::Found;
 use crate::placement::Placement;
 use crate::samples::{allocate, append_binary, append_text, least_text_bytes};
-use crate::stored::check_length;
 use crate::{Format, Limits, Note, Opened, ReadError};
 use blocks::{WordReader, check_plain, read_blocks};
 use document::{Array, Document, Storage, Support};
