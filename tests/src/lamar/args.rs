@@ -21,10 +21,13 @@ pub struct LamarArgs {
     /// What is run: all that the paper has (everything but views) unless stated
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     pub part: Vec<Part>,
+    /// Volume files or folders, in any format that `brickfield render` reads, instead of the three data sets
+    #[arg(value_name = "FILE", conflicts_with = "only")]
+    pub files: Vec<PathBuf>,
     /// The folder of real volumes
     #[arg(long, env = "BRICKFIELD_DATA", value_name = "FOLDER")]
     pub data: Option<PathBuf>,
-    /// Only data sets whose path contains this
+    /// Of the three data sets, only those whose path contains this
     #[arg(long, value_name = "TEXT")]
     pub only: Option<String>,
     /// Only bricks of so many samples a side
@@ -152,6 +155,8 @@ mod tests {
         assert!(!of_the_paper.parts().contains(&Part::Views) && of_the_paper.check.is_empty());
         assert_eq!(parse("compare --paper lamar --check --frames 1").check, [Claim::Pictures, Claim::Times]);
         assert_eq!(parse("compare --paper lamar --check=pictures").check, [Claim::Pictures]);
+        assert_eq!(parse("compare a.nrrd --paper lamar b.vti").files.len(), 2);
+        assert!(LamarArgs::try_parse_from("compare --paper lamar a.nrrd --only engine".split_whitespace()).is_err());
         let some = parse("compare --paper lamar --part views,seams,views");
         assert_eq!(some.parts(), [Part::Seams, Part::Views]);
         assert_eq!((some.size, some.views, some.volume_side), (UVec2::splat(192), 20, 512));

@@ -14,6 +14,8 @@ pub enum LamarError {
     NoData,
     #[error("no data: {} is not a folder; BRICKFIELD_DATA (or --data) names that of real volumes", path.display())]
     NoFolder { path: PathBuf },
+    #[error("no data: {} does not exist", path.display())]
+    NoVolume { path: PathBuf },
     #[error("--only {only}: no data set's path contains that; there are {known}")]
     NoSuchData { only: String, known: String },
     #[error(transparent)]
@@ -53,6 +55,7 @@ impl LamarError {
             LamarError::Backends(e) => e.status(),
             LamarError::NoData
             | LamarError::NoFolder { .. }
+            | LamarError::NoVolume { .. }
             | LamarError::NoSuchData { .. }
             | LamarError::Prepare(_) => 2,
             _ => 1,

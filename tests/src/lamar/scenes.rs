@@ -1,6 +1,6 @@
 //! What is looked at, from where, by which geometry.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use brickfield::bricks::{BrickTree, BuildOptions, Downsampling, build_tree};
 use brickfield::frame::{Backend, Division, Placement, Target};
@@ -34,30 +34,43 @@ pub(super) struct Geometry {
 
 /// Whether the data that the parts need are there, and what `--only` says is one of them.
 pub(super) fn check_data(args: &LamarArgs) -> Result<(), LamarError> {
-    if args.only.is_none() && !args.parts().into_iter().any(Part::needs_data) {
+    let are_named = args.only.is_some() || !args.files.is_empty();
+    if !are_named && !args.parts().into_iter().any(Part::needs_data) {
         return Ok(());
     }
-    match &args.data {
-        Some(folder) if !folder.is_dir() => Err(LamarError::NoFolder { path: folder.clone() }),
-        _ => exhibits(args).map(drop),
+    match named(args)?.into_iter().find(|(_, path)| !path.exists()) {
+        Some((_, path)) => Err(LamarError::NoVolume { path }),
+        None => Ok(()),
     }
 }
 
-/// The data sets that are asked for, one by one.
+/// The volumes that are asked for, one by one.
 pub(super) fn exhibits(args: &LamarArgs) -> Result<impl Iterator<Item = Result<Exhibit, LamarError>>, LamarError> {
-    let folder = args.data.clone().ok_or(LamarError::NoData)?;
-    let wanted = |path: &&str| args.only.as_ref().is_none_or(|text| path.contains(text.as_str()));
-    let paths: Vec<&str> = DATA.into_iter().filter(wanted).collect();
-    if paths.is_empty() {
-        return Err(LamarError::NoSuchData { only: args.only.clone().unwrap_or_default(), known: DATA.join(", ") });
-    }
-    Ok(paths.into_iter().map(move |path| exhibit(&folder, path)))
+    Ok(named(args)?.into_iter().map(|(name, path)| exhibit(name, &path)))
 }
 
-fn exhibit(folder: &Path, name: &str) -> Result<Exhibit, LamarError> {
-    let opened = open(&folder.join(name), &Limits::default())?;
+/// The volumes that are asked for: what the tables call them, and where they are.
+fn named(args: &LamarArgs) -> Result<Vec<(String, PathBuf)>, LamarError> {
+    if !args.files.is_empty() {
+        let name = |path: &PathBuf| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        return Ok(args.files.iter().map(|path| (name(path), path.clone())).collect());
+    }
+    let folder = args.data.as_ref().ok_or(LamarError::NoData)?;
+    if !folder.is_dir() {
+        return Err(LamarError::NoFolder { path: folder.clone() });
+    }
+    let wanted = |path: &&str| args.only.as_ref().is_none_or(|text| path.contains(text.as_str()));
+    let sets: Vec<_> = DATA.into_iter().filter(wanted).map(|path| (path.to_owned(), folder.join(path))).collect();
+    match sets.is_empty() {
+        true => Err(LamarError::NoSuchData { only: args.only.clone().unwrap_or_default(), known: DATA.join(", ") }),
+        false => Ok(sets),
+    }
+}
+
+fn exhibit(name: String, path: &Path) -> Result<Exhibit, LamarError> {
+    let opened = open(path, &Limits::default())?;
     let transfer = automatic(&opened.volume);
-    Ok(Exhibit { name: name.to_owned(), transfer, frame: opened.frame, volume: opened.volume })
+    Ok(Exhibit { name, transfer, frame: opened.frame, volume: opened.volume })
 }
 
 /// The brick sides that are asked for.
