@@ -6,7 +6,7 @@ use ash::vk;
 use brickfield_core::glam::UVec3;
 use brickfield_frame::{AtlasShape, BrickSet, Held, RenderError, SampleFormat};
 
-use crate::staging::{CHUNK_BYTES, Staging};
+use crate::staging::Staging;
 use crate::vulkan::{Device, Image, ImageBox, Queue, Use, vulkan_format};
 
 /// A set of bricks on the device.
@@ -43,7 +43,7 @@ impl Atlas {
                 recorder.barrier(Use::CopyTarget, Use::CopyTarget);
             }
         })?;
-        let bricks_per_chunk = (CHUNK_BYTES / set.brick_bytes()).max(1);
+        let bricks_per_chunk = staging.pieces_at_once(set.brick_bytes());
         for (i, bytes) in set.bytes().chunks(bricks_per_chunk * set.brick_bytes()).enumerate() {
             let first_slot = (i * bricks_per_chunk) as u32;
             copy_chunk(queue, staging, &image, &chunk_boxes(set, shape, first_slot, bytes), bytes, set.format())?;

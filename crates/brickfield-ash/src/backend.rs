@@ -50,7 +50,7 @@ impl AshBackend {
             queue: Queue::new(&device)?,
             variants: Variants::new(ShaderLibrary::embedded()),
             scene: Scene::new(&device)?,
-            staging: Staging::new(&device),
+            staging: Staging::new(&device, options.copy_bytes),
             lists: Lists::new(),
             picture: None,
             canvas: None,

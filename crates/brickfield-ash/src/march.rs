@@ -7,7 +7,7 @@ use brickfield_core::Image as Picture;
 use brickfield_core::glam::{UVec2, UVec3};
 use brickfield_frame::{FrameUniforms, Pass, RenderError, Target};
 
-use crate::staging::{CHUNK_BYTES, Staging};
+use crate::staging::Staging;
 use crate::vulkan::{BoundPipeline, Buffer, Device, Image, ImageBox, Queue, Use};
 
 /// Bytes of a pixel, and of what a ray has seen.
@@ -68,7 +68,7 @@ pub(crate) fn read_back(
 ) -> Result<Picture<f32>, RenderError> {
     let UVec3 { x: width, y: height, .. } = picture.extent();
     let mut image = Picture::transparent(UVec2::new(width, height));
-    let rows_per_band = (CHUNK_BYTES / (width as usize * target.pixel_bytes())).max(1);
+    let rows_per_band = staging.pieces_at_once(width as usize * target.pixel_bytes());
     for (i, rows) in image.pixels_mut().chunks_mut(rows_per_band * width as usize).enumerate() {
         let origin = UVec3::new(0, (i * rows_per_band) as u32, 0);
         let extent = UVec3::new(width, rows.len() as u32 / width, 1);

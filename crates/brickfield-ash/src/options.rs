@@ -6,12 +6,21 @@ use crate::ConnectError;
 use crate::vulkan::{Instance, physical_devices};
 
 /// How to connect.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
     /// Which adapter.
     pub adapter: AdapterChoice,
     /// Whether Vulkan's validation layer watches.
     pub validation: Validation,
+    /// Most bytes that are copied to or from the device at once, a brick or a row of pixels at least; 64 MiB unless stated.
+    /// So much memory of the host each direction takes at most, and a large set of bricks does not need its memory twice.
+    pub copy_bytes: usize,
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options { adapter: AdapterChoice::Default, validation: Validation::Off, copy_bytes: 64 << 20 }
+    }
 }
 
 /// Which adapter to use.

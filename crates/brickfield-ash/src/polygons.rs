@@ -65,6 +65,8 @@ impl Polygons {
             recorder.image_barrier(&canvas.image, Use::Nothing, Use::CopyTarget);
             recorder.clear(&canvas.image);
             recorder.image_barrier(&canvas.image, Use::CopyTarget, Use::Canvas);
+            // What was brought to the device was brought for shaders that compute.
+            recorder.barrier(Use::ShaderRead, Use::DrawRead);
         })?;
         let (Some(corners), Some(indices)) = (self.corners.buffer(), self.indices.buffer()) else {
             return Err(RenderError::Shader { message: "polygons are drawn before they are uploaded".to_owned() });

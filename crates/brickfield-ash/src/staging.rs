@@ -6,12 +6,10 @@ use brickfield_frame::RenderError;
 
 use crate::vulkan::{Buffer, Device, HostBuffer, Queue, Residence, Use};
 
-/// Most bytes that are copied at once: a large set of bricks does not need its memory twice.
-pub(crate) const CHUNK_BYTES: usize = 64 << 20;
-
 /// Host buffers for both directions, as large as they had to be, at most a chunk or one row of pixels.
 pub(crate) struct Staging {
     device: Arc<Device>,
+    chunk_bytes: usize,
     upload: Option<HostBuffer>,
     read_back: Option<HostBuffer>,
 }
@@ -25,9 +23,14 @@ struct Piece<'a> {
 }
 
 impl Staging {
-    /// No buffers yet.
-    pub(crate) fn new(device: &Arc<Device>) -> Staging {
-        Staging { device: device.clone(), upload: None, read_back: None }
+    /// No buffers yet; at most `chunk_bytes` are to be copied at once.
+    pub(crate) fn new(device: &Arc<Device>, chunk_bytes: usize) -> Staging {
+        Staging { device: device.clone(), chunk_bytes: chunk_bytes.max(1), upload: None, read_back: None }
+    }
+
+    /// How many pieces of so many bytes are copied at once: at least one.
+    pub(crate) fn pieces_at_once(&self, piece_bytes: usize) -> usize {
+        (self.chunk_bytes / piece_bytes).max(1)
     }
 
     /// A buffer of at least `n_bytes` that the host fills.
@@ -42,12 +45,12 @@ impl Staging {
 
     /// Frees a large upload buffer; small ones are kept for the next frame.
     pub(crate) fn shrink(&mut self) {
-        self.upload.take_if(|b| b.buffer().n_bytes() > (CHUNK_BYTES / 16) as u64);
+        self.upload.take_if(|b| b.buffer().n_bytes() > (self.chunk_bytes / 16) as u64);
     }
 
     /// Fills buffers on the device from their start, for shaders to read.
     pub(crate) fn fill(&mut self, queue: &mut Queue, contents: &[(&Buffer, &[u8])]) -> Result<(), RenderError> {
-        for batch in batches(contents, CHUNK_BYTES) {
+        for batch in batches(contents, self.chunk_bytes) {
             let staging = self.upload(batch.iter().map(|p| p.bytes.len()).sum())?;
             for piece in &batch {
                 staging.write(piece.staging_offset, piece.bytes);

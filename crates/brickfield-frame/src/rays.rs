@@ -259,6 +259,8 @@ fn from_eye(camera: &Camera, grid: &Grid, domain: &Aabb) -> [DVec3; 8] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Division, Mode, QuadratureRule, Sampling};
+    use brickfield_core::Level;
     use brickfield_core::glam::{UVec3, Vec3};
 
     fn check(camera: &Camera, grid: &Grid, tolerance: f64) {
@@ -290,6 +292,26 @@ mod tests {
         for projection in [Projection::Perspective { fov_y: 0.8 }, Projection::Orthographic { height: 30.0 }] {
             for eye in [DVec3::new(50.0, 20.0, 30.0), grid.world_box().center() + 0.1, DVec3::new(1e4, 3.0, 2.0)] {
                 check(&Camera::look_at(eye, DVec3::new(5.0, 1.0, 4.0), DVec3::Z, projection).unwrap(), &grid, 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn a_frame_starts_with_a_segment_of_its_coarsest_level() {
+        let grid = Grid::axis_aligned(UVec3::new(40, 30, 20), DVec3::ONE).unwrap();
+        let domain = Aabb { min: DVec3::splat(-0.5), max: grid.dims().as_dvec3() - 0.5 };
+        let sampling = Sampling::new(0.3, QuadratureRule::MidpointExponential, Mode::Exact).unwrap();
+        let sampling = sampling.divided(Division::Brick);
+        for placement in
+            [Placement::Shells, Placement::ViewportPlanes, Placement::TessellatedShells { facet_pixels: 9 }]
+        {
+            let steps = Steps::of(&sampling, placement, Level(2)).unwrap();
+            for distance in 30..60 {
+                let eye = grid.world_box().center() + DVec3::new(1.3, 0.2, 0.4) * f64::from(distance);
+                let projection = Projection::Perspective { fov_y: 0.8 };
+                let camera = Camera::look_at(eye, grid.world_box().center(), DVec3::Z, projection).unwrap();
+                let start = RayFrame::new(&camera, &grid, UVec2::new(40, 30), &domain, &steps).start / (4.0 * 0.3);
+                assert!((start - start.round()).abs() < 1e-9 && start >= 1.0, "{placement:?}, {distance}: {start}");
             }
         }
     }

@@ -173,7 +173,7 @@ fn open_ash(adapter: Option<&str>, validation: Validation) -> Result<Box<dyn Bac
         Validation::Off => brickfield_ash::Validation::Off,
         Validation::On => brickfield_ash::Validation::On,
     };
-    let options = Options { adapter, validation };
+    let options = Options { adapter, validation, ..Options::default() };
     let backend = AshBackend::new(&options).map_err(|e| unavailable(BackendKind::Ash, &e))?;
     Ok(Box::new(backend))
 }

@@ -182,11 +182,16 @@ fn check_facets(rays: &RayFrame) -> Result<(), PrepareError> {
     }
 }
 
-/// A brick's diagonal is as many steps long at every level.
+/// A brick is as many steps long at every level.
 fn check_polygons(tree: &BrickTree, rays: &RayFrame, step_world: f64, n_bricks: usize) -> Result<(), PrepareError> {
     const FACES: f64 = 6.0;
     let voxel = tree.grid().world_box().extent() / tree.grid().dims().as_dvec3();
-    let surfaces = voxel.length() * f64::from(tree.layout().side().n_cells()) / step_world;
+    let across = match rays.placement {
+        // Three stacks, each across an axis.
+        Placement::ObjectPlanes => voxel.element_sum(),
+        _ => voxel.length(),
+    };
+    let surfaces = across * f64::from(tree.layout().side().n_cells()) / step_world;
     let of_facets = match rays.placement {
         Placement::TessellatedShells { .. } => f64::from(rays.n_facets()) * rays.n_segments,
         _ => 0.0,
@@ -341,7 +346,7 @@ fn features(plan: &FramePlan, levels_differ: bool) -> FeatureSet {
 mod tests {
     use super::*;
     use brickfield_bricks::{BuildOptions, build_tree};
-    use brickfield_core::{Camera, Grid, Projection, TransferFunction, Volume};
+    use brickfield_core::{BrickSide, Camera, Grid, Knot, Projection, TransferFunction, Volume};
     use brickfield_lod::{Answer, Tile, select_by};
 
     #[test]
@@ -392,6 +397,42 @@ mod tests {
             refused.contains("in [65, 65, 65] samples, for an octree") && refused.contains("in [64, 64, 64]"),
             "{refused}"
         );
+    }
+
+    #[test]
+    fn what_is_kept_from_frame_to_frame_is_what_the_frame_needs() {
+        let grid = Grid::axis_aligned(UVec3::new(61, 31, 31), DVec3::ONE).unwrap();
+        // A ramp in every brick; beyond the middle with grain.
+        let value = |i: usize| (i % 61 % 15 / 2 + if i % 61 > 30 { i / 61 % 2 } else { 0 }) as u8;
+        let values: Vec<u8> = (0..grid.n_voxels()).map(value).collect();
+        let options = BuildOptions { side: BrickSide::S16, ..BuildOptions::default() };
+        let tree = build_tree(&Volume::new(grid, values).unwrap(), &options).unwrap();
+        let camera = Camera::framing(&grid.world_box(), DVec3::new(0.3, 1.0, 0.2), DVec3::Z).unwrap();
+        let visible = |values: [f64; 2], clip: [f64; 2]| {
+            let knot = |value, extinction| Knot { value, extinction, color: [1.0; 3] };
+            let transfer = TransferFunction::new(vec![knot(values[0], 0.0), knot(values[1], 0.4)]).unwrap();
+            let clip = Aabb { min: DVec3::new(clip[0], 0.0, 0.0), max: DVec3::new(clip[1], 31.0, 31.0) };
+            Scene { clip: Some(clip), ..Scene::new(camera, UVec2::new(4, 4), transfer) }
+        };
+        // As many other bricks; the same bricks with as many other knots; both back again.
+        let scenes = [
+            visible([1.0, 9.0], [0.0, 30.0]),
+            visible([1.0, 9.0], [31.0, 61.0]),
+            visible([3.0, 9.0], [31.0, 61.0]),
+            visible([5.0, 9.0], [31.0, 61.0]),
+            visible([1.0, 9.0], [0.0, 30.0]),
+        ];
+        let mut kept = Residency::default();
+        let of = |scene, residency: &mut Residency| {
+            let plan = prepare(&tree, scene, residency).unwrap();
+            (plan.bricks, plan.occupancy, plan.index, plan.beams, residency.bricks().to_vec())
+        };
+        let fresh: Vec<_> = scenes.iter().map(|scene| of(scene, &mut Residency::default())).collect();
+        assert!(fresh[0].0.n_bricks() == fresh[1].0.n_bricks() && fresh[0].0 != fresh[1].0);
+        assert!(fresh[1].4 == fresh[2].4 && fresh[1].1 != fresh[2].1);
+        for (scene, fresh) in scenes.iter().zip(&fresh) {
+            assert_eq!(of(scene, &mut kept), *fresh);
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fmt;
+use std::sync::Arc;
 
 use brickfield::bricks::BrickTree;
 use brickfield::frame::{FramePlan, ShaderFunction};
@@ -56,6 +57,8 @@ pub struct Subject {
     pub oracle: Oracle,
     /// Whether there is anything to see.
     pub shows: Shows,
+    /// How many triangles are drawn at a time, if not as many as usual.
+    pub triangles_at_a_time: Option<u32>,
 }
 
 /// Whether a picture shows anything.
@@ -121,10 +124,11 @@ impl Subject {
     pub fn plans(&self) -> Result<Plans, PrepareError> {
         let technique = Technique::RayCasting;
         let complete = Scene { skipping: Skipping::Off, technique, ..self.scene.clone() };
-        Ok(Plans {
-            replayed: prepare(&self.tree, &self.scene, &mut Residency::default())?,
-            complete: prepare(&self.tree, &complete, &mut Residency::default())?,
-        })
+        let mut replayed = prepare(&self.tree, &self.scene, &mut Residency::default())?;
+        if let Some(n) = self.triangles_at_a_time {
+            replayed.proxy = replayed.proxy.map(|proxy| Arc::new(Arc::unwrap_or_clone(proxy).in_batches_of(n)));
+        }
+        Ok(Plans { replayed, complete: prepare(&self.tree, &complete, &mut Residency::default())? })
     }
 }
 

@@ -140,7 +140,8 @@ fn open_ash(adapter: Option<&str>, validation: Validation, library: ShaderLibrar
         Validation::Off => brickfield_ash::Validation::Off,
         Validation::On => brickfield_ash::Validation::On,
     };
-    let mut backend = AshBackend::new(&Options { adapter, validation }).map_err(|e| e.to_string())?;
+    let mut backend =
+        AshBackend::new(&Options { adapter, validation, ..Options::default() }).map_err(|e| e.to_string())?;
     backend.set_library(library);
     Ok(Box::new(backend))
 }

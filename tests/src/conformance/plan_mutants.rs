@@ -79,11 +79,13 @@ pub enum PlanMutant {
     ExitsMissing,
     /// Of three stacks of planes, those across z are missing.
     StackMissing,
+    /// What was drawn is forgotten when the last batch begins.
+    BatchesForgotten,
 }
 
 impl PlanMutant {
     /// All plan mutants.
-    pub const ALL: [PlanMutant; 33] = [
+    pub const ALL: [PlanMutant; 34] = [
         PlanMutant::AnchorHalfVoxel,
         PlanMutant::PixelCorner,
         PlanMutant::RowsFlipped,
@@ -117,6 +119,7 @@ impl PlanMutant {
         PlanMutant::PolygonsMissing,
         PlanMutant::ExitsMissing,
         PlanMutant::StackMissing,
+        PlanMutant::BatchesForgotten,
     ];
 
     /// The mutant's name in reports.
@@ -155,13 +158,14 @@ impl PlanMutant {
             PlanMutant::PolygonsMissing => "plan/polygons-missing",
             PlanMutant::ExitsMissing => "plan/exits-missing",
             PlanMutant::StackMissing => "plan/stack-missing",
+            PlanMutant::BatchesForgotten => "plan/batches-forgotten",
         }
     }
 
     /// Whether it is in the polygons, which only backends with a rasteriser draw.
     pub fn is_of_polygons(self) -> bool {
-        use PlanMutant::{ExitsMissing, PolygonsMissing, PolygonsReversed, StackMissing};
-        matches!(self, PolygonsReversed | PolygonsMissing | ExitsMissing | StackMissing)
+        use PlanMutant::{BatchesForgotten, ExitsMissing, PolygonsMissing, PolygonsReversed, StackMissing};
+        matches!(self, PolygonsReversed | PolygonsMissing | ExitsMissing | StackMissing | BatchesForgotten)
     }
 
     /// The plan with this thing wrong.
@@ -219,6 +223,7 @@ impl PlanMutant {
             }),
             PlanMutant::ExitsMissing => drop_triangles(plan, |corner| corner.surface == ProxyCorner::EXIT),
             PlanMutant::StackMissing => drop_triangles(plan, |corner| corner.owner / 2 == 2),
+            PlanMutant::BatchesForgotten => forget_batches(plan),
         }
     }
 }
@@ -245,6 +250,11 @@ fn drop_triangles(plan: &mut FramePlan, is_dropped: impl Fn(&ProxyCorner) -> boo
         let dropped = triangles.iter_mut().filter(|t| is_dropped(&corners[t[0] as usize]));
         dropped.for_each(|t| *t = [0; 3]);
     });
+}
+
+fn forget_batches(plan: &mut FramePlan) {
+    let last = plan.proxy.as_ref().and_then(|proxy| proxy.batches().last().map(|batch| batch.start as usize / 3));
+    edit_triangles(plan, |_, triangles| triangles[..last.unwrap_or(0)].fill([0; 3]));
 }
 
 fn shift_half_pixel(plan: &mut FramePlan) {

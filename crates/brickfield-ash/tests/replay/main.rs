@@ -10,7 +10,11 @@ use brickfield_ash::{AshBackend, ConnectError, Options, Validation};
 
 /// A backend, if this machine has one.
 fn connect(validation: Validation) -> Option<AshBackend> {
-    match AshBackend::new(&Options { validation, ..Options::default() }) {
+    connect_with(&Options { validation, ..Options::default() })
+}
+
+fn connect_with(options: &Options) -> Option<AshBackend> {
+    match AshBackend::new(options) {
         Ok(backend) => Some(backend),
         Err(e @ (ConnectError::NoLoader { .. } | ConnectError::NoDevice | ConnectError::NoValidationLayer)) => {
             println!("no device: {e}");

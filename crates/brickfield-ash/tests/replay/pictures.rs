@@ -1,12 +1,18 @@
 //! Pictures against closed forms.
 
-use brickfield_ash::Validation;
+use std::sync::Arc;
+
+use brickfield_ash::{Options, Validation};
 use brickfield_core::{Aabb, Image, TransferFunction, glam::DVec3};
-use brickfield_frame::{Backend, Feature, FeatureSet, FramePlan, Mode, QuadratureRule, SampleFormat};
+use brickfield_frame::{
+    Backend, Feature, FeatureSet, FramePlan, Mode, Placement, QuadratureRule, SampleFormat, Target,
+};
 
-use crate::connect;
-use crate::plans::{bumps, nothing, plan, ramp, rising};
+use crate::plans::{bumps, nothing, plan, polygons, ramp, rising};
+use crate::{connect, connect_with};
 
+const PLACEMENTS: [Placement; 3] =
+    [Placement::ObjectPlanes, Placement::ViewportPlanes, Placement::TessellatedShells { facet_pixels: 4 }];
 const FORMATS: [SampleFormat; 3] = [SampleFormat::Unorm8, SampleFormat::Unorm16, SampleFormat::Float32];
 const FAST: Mode = Mode::Fast { transmittance_floor: 0.0 };
 
@@ -87,4 +93,34 @@ fn a_picture_in_many_submits_is_the_same_to_the_bit() {
     let visible = Aabb { min: DVec3::splat(-1e8), max: DVec3::splat(1e8) };
     let bands = backend.render(&FramePlan { visible, ..plan }).unwrap();
     assert_eq!(whole.image, bands.image);
+}
+
+#[test]
+fn a_slab_of_polygons_has_its_closed_form() {
+    let Some(mut backend) = connect(Validation::Off) else { return };
+    let transfer = TransferFunction::constant(0.07, [0.2, 0.4, 0.8]).unwrap();
+    let rays = plan(ramp(SampleFormat::Unorm8), transfer, QuadratureRule::MidpointExponential, Mode::Exact);
+    for placement in PLACEMENTS {
+        for (target, tolerance) in [(Target::Float32, 2e-6), (Target::Float16, 1e-2)] {
+            let frame = backend.render(&polygons(&rays, placement, target)).unwrap();
+            let what = format!("{} {}", placement.name(), target.name());
+            assert_close(&frame.image, layer(0.07 * 16.0, [0.2, 0.4, 0.8]), tolerance, &what);
+        }
+    }
+}
+
+#[test]
+fn a_picture_of_many_small_copies_and_batches_is_the_same_to_the_bit() {
+    // A brick at a time; three rows of pixels; a buffer in many pieces.
+    let options = Options { copy_bytes: 1000, ..Options::default() };
+    let (Some(mut whole), Some(mut pieces)) = (connect(Validation::Off), connect_with(&options)) else { return };
+    let rays = plan(bumps(SampleFormat::Unorm16), rising(0.02), QuadratureRule::MidpointExponential, Mode::Exact);
+    assert_eq!(whole.render(&rays).unwrap().image, pieces.render(&rays).unwrap().image);
+    for target in [Target::Float32, Target::Float16] {
+        let polygons = polygons(&rays, Placement::ViewportPlanes, target);
+        let mut batches = polygons.clone();
+        batches.proxy = polygons.proxy.as_deref().map(|proxy| Arc::new(proxy.clone().in_batches_of(7)));
+        assert!(batches.proxy.as_deref().is_some_and(|proxy| proxy.batches().len() > 9));
+        assert_eq!(whole.render(&polygons).unwrap().image, pieces.render(&batches).unwrap().image);
+    }
 }

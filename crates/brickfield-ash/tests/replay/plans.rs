@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
-use brickfield_core::{BrickSide, Camera, Grid, Knot, Level, Projection, TransferFunction};
+use brickfield_core::{Aabb, BrickSide, Camera, Grid, Knot, Level, Projection, TransferFunction};
 use brickfield_frame::{
-    BrickSet, Decode, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, QuadratureRule, RayFrame,
-    SampleFormat, Sampling, Steps,
+    BrickSet, Decode, Division, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, Placement, ProxyGeometry,
+    QuadratureRule, RayFrame, SampleFormat, Sampling, Steps, Target,
 };
 
 const N: u32 = 16;
+const DIMS: UVec3 = UVec3::new(2 * N - 1, N, N);
 
 /// Two bricks side by side along x: 31 x 16 x 16 samples whose value is their z. A third brick is nowhere: with it the
 /// atlas has a place that no brick fills.
@@ -51,23 +52,18 @@ pub(crate) fn rising(slope: f64) -> TransferFunction {
 
 /// A picture of the two bricks along z: all rays cross 16 voxels of 1 world unit.
 pub(crate) fn plan(bricks: BrickSet, transfer: TransferFunction, rule: QuadratureRule, mode: Mode) -> FramePlan {
-    let dims = UVec3::new(2 * N - 1, N, N);
-    let grid = Grid::axis_aligned(dims, DVec3::ONE).unwrap();
-    let target = grid.world_box().center();
-    let projection = Projection::Orthographic { height: 12.0 };
-    let camera = Camera::look_at(target - DVec3::Z * 20.5, target, -DVec3::Y, projection).unwrap();
-    let domain = brickfield_core::Aabb { min: DVec3::splat(-0.5), max: dims.as_dvec3() - 0.5 };
     let sampling = Sampling::new(0.5, rule, mode).unwrap();
+    let rays = rays(&Steps::shells(sampling.step_world()));
     let mut index = IndexGrid::transparent(UVec3::new(2, 1, 1));
     for slot in 0..2 {
         index.fill(UVec3::new(slot, 0, 0), IndexEntry::Resident { slot, level: Level(0) });
     }
     let features = features(&transfer, mode);
     FramePlan {
-        dims,
-        rays: RayFrame::new(&camera, &grid, UVec2::new(20, 12), &domain, &Steps::shells(sampling.step_world())),
-        domain,
-        visible: domain,
+        dims: DIMS,
+        rays,
+        domain: domain(),
+        visible: domain(),
         sampling,
         transfer,
         index,
@@ -77,6 +73,28 @@ pub(crate) fn plan(bricks: BrickSet, transfer: TransferFunction, rule: Quadratur
         proxy: None,
         features,
     }
+}
+
+/// The same through the rasteriser.
+pub(crate) fn polygons(plan: &FramePlan, placement: Placement, target: Target) -> FramePlan {
+    let sampling = plan.sampling.divided(Division::Brick);
+    let rays = rays(&Steps::of(&sampling, placement, Level(0)).unwrap());
+    let mut plan = FramePlan { rays, sampling, ..plan.clone() };
+    let beside_each_other = [UVec3::ZERO, UVec3::X];
+    plan.proxy = Some(Arc::new(ProxyGeometry::of(&plan, &beside_each_other, target)));
+    plan
+}
+
+fn rays(steps: &Steps) -> RayFrame {
+    let grid = Grid::axis_aligned(DIMS, DVec3::ONE).unwrap();
+    let target = grid.world_box().center();
+    let projection = Projection::Orthographic { height: 12.0 };
+    let camera = Camera::look_at(target - DVec3::Z * 20.5, target, -DVec3::Y, projection).unwrap();
+    RayFrame::new(&camera, &grid, UVec2::new(20, 12), &domain(), steps)
+}
+
+fn domain() -> Aabb {
+    Aabb { min: DVec3::splat(-0.5), max: DIMS.as_dvec3() - 0.5 }
 }
 
 /// The same with nothing in it.

@@ -1,11 +1,13 @@
 //! The validation layer, synchronisation included, has nothing to say.
 
+use std::sync::Arc;
+
 use brickfield_ash::{AshBackend, Validation};
 use brickfield_core::{TransferFunction, glam::UVec2};
-use brickfield_frame::{Backend, FramePlan, Mode, QuadratureRule, SampleFormat, ShaderFunction};
+use brickfield_frame::{Backend, FramePlan, Mode, Placement, QuadratureRule, SampleFormat, ShaderFunction, Target};
 
 use crate::connect;
-use crate::plans::{bumps, nothing, plan, ramp, rising};
+use crate::plans::{bumps, nothing, plan, polygons, ramp, rising};
 
 const FAST: Mode = Mode::Fast { transmittance_floor: 1e-3 };
 
@@ -19,6 +21,14 @@ fn the_layer_is_silent_from_the_first_call_to_the_last() {
     }
     for rule in QuadratureRule::ALL {
         exercise(&mut backend, &plan(ramp(SampleFormat::Unorm8), rising(0.05), rule, Mode::Exact));
+    }
+    // Drawing and marching by turns, into both kinds of targets, in several batches.
+    let rays = plan(bumps(SampleFormat::Unorm8), rising(0.05), QuadratureRule::Gauss2, Mode::Exact);
+    for target in [Target::Float32, Target::Float16, Target::Float32] {
+        let mut drawn = polygons(&rays, Placement::ObjectPlanes, target);
+        drawn.proxy = drawn.proxy.map(|proxy| Arc::new(Arc::unwrap_or_clone(proxy).in_batches_of(20)));
+        backend.render(&drawn).unwrap();
+        backend.render(&rays).unwrap();
     }
     let constant = TransferFunction::constant(0.1, [1.0; 3]).unwrap();
     exercise(&mut backend, &plan(ramp(SampleFormat::Unorm8), constant, QuadratureRule::Gauss2, FAST));

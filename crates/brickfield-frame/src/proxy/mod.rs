@@ -120,15 +120,24 @@ impl ProxyGeometry {
             batches: Vec::new(),
             n_polygons: 0,
         };
-        geometry.fill(&outlines);
+        geometry.fill(&outlines, BATCH_FRAGMENTS);
         geometry
     }
 
-    fn fill(&mut self, outlines: &[Vec<Outline>]) {
+    /// The same polygons in batches of at most `n_triangles` (at least 1): the picture is the same. Those of [`of`](Self::of) are
+    /// so large that only large pictures have several.
+    #[must_use]
+    pub fn in_batches_of(mut self, n_triangles: u32) -> ProxyGeometry {
+        let (end, n) = (self.indices.len() as u32, n_triangles.clamp(1, u32::MAX / 3) * 3);
+        self.batches = (0..end).step_by(n as usize).map(|start| start..end.min(start.saturating_add(n))).collect();
+        self
+    }
+
+    fn fill(&mut self, outlines: &[Vec<Outline>], batch_fragments: f64) {
         let (mut batch_start, mut n_fragments) = (0, 0.0);
         for (brick, outline) in outlines.iter().enumerate().flat_map(|(i, of)| of.iter().map(move |o| (i, o))) {
             n_fragments += self.push(brick as u32, outline);
-            if n_fragments >= BATCH_FRAGMENTS {
+            if n_fragments >= batch_fragments {
                 self.batches.push(batch_start..self.indices.len() as u32);
                 (batch_start, n_fragments) = (self.indices.len() as u32, 0.0);
             }
@@ -191,5 +200,43 @@ impl ProxyGeometry {
     /// Bytes of bricks, corners and indices.
     pub fn n_bytes(&self) -> usize {
         size_of_val(&self.bricks[..]) + size_of_val(&self.corners[..]) + size_of_val(&self.indices[..])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use brickfield_core::glam::DVec2;
+
+    fn squares(sides: &[f64]) -> ProxyGeometry {
+        let corners = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
+        let square = |side: &f64| Outline { points: corners.map(|p| p * *side).to_vec(), surface: 1.0, owner: 0 };
+        let outlines = [sides.iter().map(square).collect()];
+        let mut geometry = ProxyGeometry {
+            target: Target::Float32,
+            bricks: vec![[0; 4]],
+            corners: Vec::new(),
+            indices: Vec::new(),
+            batches: Vec::new(),
+            n_polygons: 0,
+        };
+        geometry.fill(&outlines, 100.0);
+        geometry
+    }
+
+    #[test]
+    fn batches_are_all_triangles_once_and_in_order() {
+        // A batch ends with the polygon that fills it.
+        assert_eq!(squares(&[6.0, 6.0, 6.0, 1.0, 20.0, 3.0]).batches(), [0..18, 18..30, 30..36]);
+        assert!(squares(&[10.0, 1.0]).batches() == [0..6, 6..12] && squares(&[]).batches().is_empty());
+    }
+
+    #[test]
+    fn smaller_batches_are_all_triangles_once_and_in_order() {
+        let of = |n_triangles| squares(&[10.0, 1.0]).in_batches_of(n_triangles).batches().to_vec();
+        assert_eq!(of(3), [0..9, 9..12]);
+        assert_eq!(of(0), [0..3, 3..6, 6..9, 9..12]);
+        assert!(of(4) == of(u32::MAX) && of(4).len() == 1 && of(4)[0] == (0..12));
+        assert!(squares(&[]).in_batches_of(1).batches().is_empty());
     }
 }

@@ -88,6 +88,19 @@ fn mixed() -> Vec<Case> {
                 .detail_reproduced(distance(1.0))
                 .eye(DVec3::new(-6.0, -14.0, 20.0), DVec3::new(30.0, 30.0, 15.0))
         }),
+        // Coarse voxels across the edge between two dark values see what lies between them; fine ones see the edge itself.
+        picture("cut/dark-on-both-sides", catches![VisibleTooSmall, WrongLevel, shader::LEVEL_SCALE], || {
+            let grid = Grid::axis_aligned(UVec3::new(71, 66, 53), DVec3::ONE).expect("a grid");
+            let edge = |i: usize| if i % 71 <= 30 { 51u8 } else { 230 };
+            let volume =
+                Volume::new(grid, (0..grid.n_voxels()).map(edge).collect::<Vec<u8>>()).expect("as many voxels");
+            let knots = [knot(56.0, 0.0, WARM), knot(74.0, 0.9, WARM), knot(92.0, 0.0, COOL)];
+            let beside = brickfield_core::WorldPos(DVec3::new(-20.0, 33.0, 26.0));
+            Setup::new(volume, TransferFunction::new(knots.into()).expect("knots ascend"))
+                .detail(Criterion::DistanceFrom { point: beside, factor: 1.0 }, Downsampling::Average)
+                .rule(QuadratureRule::PreIntegrated)
+                .step(0.9)
+        }),
         picture("cut/several-levels-sparse", catches![VisibleTooSmall, WrongLevel, shader::LEVEL_SCALE], move || {
             let grid = Grid::axis_aligned(UVec3::new(71, 66, 53), DVec3::ONE).expect("a grid");
             Setup::new(sparse(&grid, ScalarType::U8), soft(ScalarType::U8))
@@ -115,6 +128,10 @@ fn skipping() -> Vec<Case> {
     let mut cases: Vec<Case> = QuadratureRule::ALL.map(rule).into();
     cases.push(picture("skip/long-steps-preintegrated", catches![VisibleTooSmall, ExtinctionScaled], move || {
         scene().rule(QuadratureRule::PreIntegrated).step(11.0)
+    }));
+    // Longer than a brick.
+    cases.push(picture("skip/longer-steps-preintegrated", catches![VisibleTooSmall, ExtinctionScaled], move || {
+        scene().rule(QuadratureRule::PreIntegrated).step(34.0)
     }));
     // Inside bricks: much of them is dark, at every side of bricks.
     for side in BrickSide::ALL {

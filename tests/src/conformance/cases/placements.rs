@@ -4,7 +4,7 @@ use brickfield::bricks::Downsampling;
 use brickfield::frame::{Division, Lengths, Placement};
 use brickfield::lod::Criterion;
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Grid, ScalarType, TransferFunction, Volume, WorldPos};
+use brickfield_core::{Grid, Level, ScalarType, TransferFunction, Volume, WorldPos};
 use brickfield_optics::QuadratureRule;
 
 use super::fields::{WARM, checkers, grid, hills, skew_grid, soft, sparse};
@@ -142,6 +142,16 @@ fn extremes() -> Vec<Case> {
             })
         })
     };
+    // Where passes begin is counted in steps of level 0.
+    let coarse = |(placement, _): (Placement, _)| {
+        let name = format!("placement/long-rays-in-coarse-bricks-{}", placement.name());
+        picture(name, catches![shader::PASS_FORGETS, ExtinctionScaled], move || {
+            placed(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), placement)
+                .step(0.0006)
+                .detail(Criterion::Uniform(Level(1)), Downsampling::Average)
+                .with(|s| (s.size, s.division) = (UVec3::new(4, 3, 0).truncate(), Division::Brick))
+        })
+    };
     let far = |(placement, _): (Placement, _)| {
         let name = format!("placement/far-eye-{}", placement.name());
         picture(name, catches![ExtinctionScaled, AnchorHalfVoxel], move || {
@@ -209,7 +219,8 @@ fn extremes() -> Vec<Case> {
     let all = || PLACEMENTS.into_iter();
     let both = [Division::Ray, Division::Brick].into_iter();
     let long = both.flat_map(|division| PLACEMENTS.map(|(placement, _)| (placement, division))).map(long);
-    long.chain(all().map(far))
+    long.chain(all().map(coarse))
+        .chain(all().map(far))
         .chain(all().map(constant))
         .chain(all().map(in_a_face))
         .chain(all().map(wide))

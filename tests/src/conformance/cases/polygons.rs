@@ -128,6 +128,22 @@ fn degenerate() -> Vec<Case> {
     let in_two_faces = move |p| along_x(p, 30.5 - 1e-9, 30.5 - 1e-9);
     let magnified =
         move |p| polygons(large(), soft(ScalarType::U16), p).lens(DVec3::new(-40.0, -70.0, 41.0), center, 2e-5);
+    // Two stacks are as steep for many a pixel's ray.
+    let along_a_tie =
+        move |p| polygons(large(), soft(ScalarType::U16), p).lens(center - DVec3::new(60.0, 60.0, 7.0), center, 4e-3);
+    // Nearer to a face than half a voxel: which of the two bricks is behind the other?
+    let beside_a_face = move |p| {
+        polygons(large(), soft(ScalarType::U16), p).eye(DVec3::new(30.3, 45.3, 17.9), DVec3::new(60.0, 60.0, 30.0))
+    };
+    // Bricks end where the volume does, half a voxel behind their last samples; the eye is beside its corner.
+    let beside_the_corner = |p| {
+        let grid = Grid::axis_aligned(UVec3::new(46, 61, 31), DVec3::ONE).expect("a grid");
+        polygons(hills(&grid, ScalarType::U8), soft(ScalarType::U8), p).lens(
+            DVec3::splat(-0.7),
+            DVec3::splat(25.0),
+            2.5,
+        )
+    };
     let eye_in_a_corner = move |p| mixed(p).eye(DVec3::splat(30.5) + 1e-5, center + 20.0);
     let steps = |p| polygons(large(), soft(ScalarType::U16), p).step(1e12);
     let both = || catches![PolygonsReversed, ExitsMissing];
@@ -137,6 +153,9 @@ fn degenerate() -> Vec<Case> {
     cases.extend(each("rays-in-two-faces", both(), in_two_faces));
     cases.extend(each("magnified", both(), magnified));
     cases.extend(each("eye-in-a-corner", both(), eye_in_a_corner));
+    cases.extend(each("along-a-tie", both(), along_a_tie));
+    cases.extend(each("eye-beside-a-face", both(), beside_a_face));
+    cases.extend(each("eye-beside-the-corner", both(), beside_the_corner));
     cases.extend(each("one-step", catches![ExitsMissing], steps));
     cases
 }
@@ -160,8 +179,15 @@ fn stiff() -> Vec<Case> {
 }
 
 fn targets() -> Vec<Case> {
-    each("rgba16float", catches![PolygonsReversed, ExitsMissing], |p| {
+    let float16 = |p| {
         polygons(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), p)
             .with(|s| s.technique = Technique::Polygons(Target::Float16))
-    })
+    };
+    let in_batches = |p| polygons(hills(&grid(), ScalarType::U8), soft(ScalarType::U8), p).triangles_at_a_time(100);
+    let mut cases = each("rgba16float", catches![PolygonsReversed, ExitsMissing], float16);
+    cases.extend(each("in-batches", catches![BatchesForgotten, PolygonsReversed], in_batches));
+    cases.extend(each("in-batches-rgba16float", catches![BatchesForgotten], move |p| {
+        float16(p).triangles_at_a_time(100)
+    }));
+    cases
 }

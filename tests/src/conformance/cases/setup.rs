@@ -16,6 +16,7 @@ pub(super) struct Setup {
     downsampling: Downsampling,
     oracle: OracleKind,
     shows: Shows,
+    triangles_at_a_time: Option<u32>,
     scene: Scene,
 }
 
@@ -40,6 +41,7 @@ impl Setup {
             downsampling: Downsampling::Average,
             oracle: OracleKind::Volume,
             shows: Shows::Something,
+            triangles_at_a_time: None,
             scene: Scene::new(camera, PICTURE, transfer),
             volume,
         }
@@ -54,6 +56,11 @@ impl Setup {
     /// There is nothing to see.
     pub(super) fn blank(self) -> Setup {
         Setup { shows: Shows::Nothing, ..self }
+    }
+
+    /// Draws polygons in batches of so many triangles.
+    pub(super) fn triangles_at_a_time(self, n: u32) -> Setup {
+        Setup { triangles_at_a_time: Some(n), ..self }
     }
 
     pub(super) fn rule(self, rule: QuadratureRule) -> Setup {
@@ -123,7 +130,8 @@ impl Setup {
             OracleKind::EveryLevel => Oracle::EveryLevel(volume),
             OracleKind::None => Oracle::None,
         };
-        Subject { tree, scene: self.scene, oracle, shows: self.shows }
+        let Setup { scene, shows, triangles_at_a_time, .. } = self;
+        Subject { tree, scene, oracle, shows, triangles_at_a_time }
     }
 }
 
