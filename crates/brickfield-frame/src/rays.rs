@@ -261,7 +261,7 @@ mod tests {
     use super::*;
     use crate::{Division, Mode, QuadratureRule, Sampling};
     use brickfield_core::Level;
-    use brickfield_core::glam::{UVec3, Vec3};
+    use brickfield_core::glam::{UVec3, Vec3, Vec3Swizzles};
 
     fn check(camera: &Camera, grid: &Grid, tolerance: f64) {
         let size = UVec2::new(40, 30);
@@ -357,6 +357,25 @@ mod tests {
                 let (low, high) = (DVec3::splat(-1.0 / 6.0), grid.dims().as_dvec3() + 1.0 / 6.0);
                 let first = grid.world(IndexPos(if direction[axis] > 0.0 { low } else { high })).0;
                 assert!(whole_steps((camera.eye() + p - first)[axis]), "{p}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_frame_has_segments_for_its_longest_ray_along_any_axis() {
+        for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+            let grid = Grid::axis_aligned((axis * 50.0 + 3.0).as_uvec3(), DVec3::ONE).unwrap();
+            let domain = Aabb { min: DVec3::splat(-0.5), max: grid.dims().as_dvec3() - 0.5 };
+            for placement in [Placement::Shells, Placement::ViewportPlanes, Placement::ObjectPlanes] {
+                let steps = Steps { step_world: 0.25, placement, coarsest_world: 0.25 };
+                let eye = grid.world_box().center() - axis * 60.0;
+                let camera = Camera::look_at(eye, grid.world_box().center(), axis.yzx(), PERSPECTIVE).unwrap();
+                let frame = RayFrame::new(&camera, &grid, UVec2::new(41, 31), &domain, &steps);
+                let central = frame.ray(20, 15);
+                let volume = Aabb { min: domain.min - frame.center, max: domain.max - frame.center };
+                let ray = brickfield_core::Ray { origin: central.at(0.0), direction: central.direction };
+                let end = ray.clip(&volume).unwrap().end;
+                assert!(end <= frame.n_segments * 0.25 + 1e-9, "{placement:?} along {axis}: {end}");
             }
         }
     }

@@ -140,10 +140,13 @@ fn nothing_visible_is_a_transparent_picture() {
 fn pictures_of_any_size_come_back_whole() {
     let Some(mut backend) = backend() else { return };
     let scene = Scene::new(DIMS, ball, warm());
-    for size in [UVec2::new(1, 1), UVec2::new(17, 3), UVec2::new(64, 64), UVec2::new(129, 5)] {
+    for size in [UVec2::new(1, 1), UVec2::new(17, 3), UVec2::new(64, 64), UVec2::new(129, 5), UVec2::new(5, 129)] {
         let frame = backend.render(&Scene { size, ..scene.clone() }.plan()).unwrap();
         assert_eq!(frame.image.size(), size);
         assert_eq!(frame.image.pixels().len(), (size.x * size.y) as usize);
+        // The first picture of a backend has nothing to reuse.
+        let fresh = self::backend().unwrap().render(&Scene { size, ..scene.clone() }.plan()).unwrap();
+        assert_eq!(frame.image, fresh.image);
     }
     let limit = backend.describe().capabilities.max_image;
     let size = UVec2::new(limit + 1, 1);

@@ -111,16 +111,18 @@ fn a_slab_of_polygons_has_its_closed_form() {
 
 #[test]
 fn a_picture_of_many_small_copies_and_batches_is_the_same_to_the_bit() {
-    // A brick at a time; three rows of pixels; a buffer in many pieces.
-    let options = Options { copy_bytes: 1000, ..Options::default() };
-    let (Some(mut whole), Some(mut pieces)) = (connect(Validation::Off), connect_with(&options)) else { return };
+    let Some(mut whole) = connect(Validation::Off) else { return };
     let rays = plan(bumps(SampleFormat::Unorm16), rising(0.02), QuadratureRule::MidpointExponential, Mode::Exact);
-    assert_eq!(whole.render(&rays).unwrap().image, pieces.render(&rays).unwrap().image);
-    for target in [Target::Float32, Target::Float16] {
-        let polygons = polygons(&rays, Placement::ViewportPlanes, target);
-        let mut batches = polygons.clone();
-        batches.proxy = polygons.proxy.as_deref().map(|proxy| Arc::new(proxy.clone().in_batches_of(7)));
-        assert!(batches.proxy.as_deref().is_some_and(|proxy| proxy.batches().len() > 9));
-        assert_eq!(whole.render(&polygons).unwrap().image, pieces.render(&batches).unwrap().image);
+    // One and two bricks at a time; three rows of pixels, and all; buffers in many pieces, and in one.
+    for copy_bytes in [1000, 20_000] {
+        let mut pieces = connect_with(&Options { copy_bytes, ..Options::default() }).unwrap();
+        assert_eq!(whole.render(&rays).unwrap().image, pieces.render(&rays).unwrap().image);
+        for target in [Target::Float32, Target::Float16] {
+            let polygons = polygons(&rays, Placement::ViewportPlanes, target);
+            let mut batches = polygons.clone();
+            batches.proxy = polygons.proxy.as_deref().map(|proxy| Arc::new(proxy.clone().in_batches_of(7)));
+            assert!(batches.proxy.as_deref().is_some_and(|proxy| proxy.batches().len() > 9));
+            assert_eq!(whole.render(&polygons).unwrap().image, pieces.render(&batches).unwrap().image);
+        }
     }
 }
