@@ -74,8 +74,10 @@ pub(super) struct Outcome {
 
 /// Ratios closer to 1 are in doubt, and measured further.
 const IN_DOUBT: std::ops::Range<f64> = 1.0 / 1.15..1.15;
+/// Of so many rounds at most one may say the contrary: else they are in doubt, too, as when the machine was busy with something else.
+const ROUNDS_A_DISSENT: usize = 8;
 /// Most rounds, for each that is asked for.
-const MOST_ROUNDS: u32 = 5;
+const MOST_ROUNDS: u32 = 9;
 
 /// At least `n_rounds` rounds, and up to [`MOST_ROUNDS`] times as many while it is in doubt which is faster.
 pub(super) fn duel(
@@ -89,14 +91,22 @@ pub(super) fn duel(
     loop {
         let last = [first.frame(backend)?, second.frame(backend)?];
         ratios.push(first.ms[ratios.len()] / second.ms[ratios.len()]);
-        let (n, ratio) = (ratios.len() as u32, median(ratios.clone()));
+        let n = ratios.len() as u32;
         let [a, b] = last;
         // Of the same bricks neither is faster.
-        let is_open = IN_DOUBT.contains(&ratio) && a.1 != b.1;
+        let is_open = a.1 != b.1 && in_doubt(&ratios);
         if n >= n_rounds && (n >= MOST_ROUNDS * n_rounds || !is_open) {
-            return Ok(Duel { first: first.outcome(a), second: second.outcome(b), ratio, n_rounds: ratios.len() });
+            let (ratio, n_rounds) = (median(ratios.clone()), ratios.len());
+            return Ok(Duel { first: first.outcome(a), second: second.outcome(b), ratio, n_rounds });
         }
     }
+}
+
+/// Whether rounds of these ratios leave open who is faster.
+fn in_doubt(ratios: &[f64]) -> bool {
+    let n_above = ratios.iter().filter(|ratio| **ratio > 1.0).count();
+    let n_dissenting = n_above.min(ratios.len() - n_above);
+    IN_DOUBT.contains(&median(ratios.to_vec())) || n_dissenting * ROUNDS_A_DISSENT > ratios.len()
 }
 
 /// One scene on one backend.
@@ -168,4 +178,19 @@ pub(super) fn distance(image: &Image<f32>, answer: &Image<f64>) -> Result<Distan
     let e = errors(image, answer)?;
     let delta_e_mean = delta_e(image, answer, [0.0; 3])?.mean;
     Ok(Distance { rmse: e.rmse, max: e.worst.difference, delta_e_mean })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_is_faster_is_open_while_it_is_close_or_rounds_disagree() {
+        assert!(!in_doubt(&[1.2, 2.0, 1.5]) && !in_doubt(&[0.5, 0.6, 0.7]));
+        assert!(in_doubt(&[1.1, 1.12, 1.2]) && in_doubt(&[0.9, 0.8, 0.95]));
+        // Most of them clear, but not of one mind.
+        assert!(in_doubt(&[0.8, 0.7, 0.5, 1.3]));
+        assert!(in_doubt(&[0.8, 0.7, 0.5, 0.6, 0.8, 0.8, 1.3]));
+        assert!(!in_doubt(&[0.8, 0.7, 0.5, 0.6, 0.8, 0.8, 0.8, 1.3]));
+    }
 }
