@@ -13,7 +13,8 @@ pub struct Options {
     /// Whether Vulkan's validation layer watches.
     pub validation: Validation,
     /// Most bytes that are copied to or from the device at once, a brick or a row of pixels at least; 64 MiB unless stated.
-    /// So much memory of the host each direction takes at most, and a large set of bricks does not need its memory twice.
+    /// So much memory of the host, up to the next power of two and 64 KiB at least, each direction takes at most: a large set
+    /// of bricks does not need its memory twice.
     pub copy_bytes: usize,
 }
 

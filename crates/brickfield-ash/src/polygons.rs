@@ -74,7 +74,6 @@ impl Polygons {
         for range in proxy.batches() {
             let triangles = Triangles { corners, indices, range: range.clone() };
             let batch_ms = queue.run_timed("drawing polygons", |recorder| {
-                recorder.barrier(Use::CopyTarget, Use::DrawRead);
                 recorder.image_barrier(&canvas.image, Use::Canvas, Use::Canvas);
                 recorder.draw(bound, canvas, triangles);
             })?;
