@@ -46,7 +46,8 @@ pub struct LamarArgs {
     /// Pixels along a side of the facets of shells
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=i64::from(brickfield::frame::Placement::MOST_FACET_PIXELS)))]
     pub facet_pixels: u32,
-    /// Timed frames of each contestant, which take turns; up to nine times as many while it is in doubt which is faster
+    /// Timed frames of each contestant, which take turns; in the table up to 27 times as many while it is in doubt
+    /// which is faster
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     pub frames: u32,
     /// Backends to compare

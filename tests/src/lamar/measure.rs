@@ -1,10 +1,11 @@
 //! Frames: how long, how far from the answer, and whether as the plan says.
 
+use std::ops::RangeInclusive;
 use std::time::Instant;
 
 use brickfield::bricks::BrickTree;
 use brickfield::cpu::{ContinuousOptions, Discrete, continuous, discrete};
-use brickfield::frame::Backend;
+use brickfield::frame::{Backend, RenderError};
 use brickfield::{Residency, Scene, Skipping, Technique, prepare};
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Aabb, Image, Volume};
@@ -72,41 +73,52 @@ pub(super) struct Outcome {
     pub(super) prepare_ms: Spread,
 }
 
-/// Ratios closer to 1 are in doubt, and measured further.
-const IN_DOUBT: std::ops::Range<f64> = 1.0 / 1.15..1.15;
-/// Of so many rounds at most one may say the contrary: else they are in doubt, too, as when the machine was busy with something else.
-const ROUNDS_A_DISSENT: usize = 8;
-/// Most rounds, for each that is asked for.
-const MOST_ROUNDS: u32 = 9;
-
-/// At least `n_rounds` rounds, and up to [`MOST_ROUNDS`] times as many while it is in doubt which is faster.
+/// At least so many rounds, and on to so many while it is in doubt which is faster. Who begins a round ended the one before.
 pub(super) fn duel(
     tree: &BrickTree,
     scenes: &[Scene; 2],
     backend: &mut dyn Backend,
-    n_rounds: u32,
+    rounds: RangeInclusive<u32>,
 ) -> Result<Duel, LamarError> {
     let [mut first, mut second] = [0, 1].map(|i| Contestant::new(tree, &scenes[i]));
     let mut ratios = Vec::new();
+    first.warm_up(backend)?;
     loop {
-        let last = [first.frame(backend)?, second.frame(backend)?];
+        let (a, b) = match ratios.len() % 2 {
+            0 => {
+                let a = first.frame(backend)?;
+                second.warm_up(backend)?;
+                (a, second.frame(backend)?)
+            }
+            _ => {
+                let b = second.frame(backend)?;
+                first.warm_up(backend)?;
+                (first.frame(backend)?, b)
+            }
+        };
         ratios.push(first.ms[ratios.len()] / second.ms[ratios.len()]);
         let n = ratios.len() as u32;
-        let [a, b] = last;
         // Of the same bricks neither is faster.
         let is_open = a.1 != b.1 && in_doubt(&ratios);
-        if n >= n_rounds && (n >= MOST_ROUNDS * n_rounds || !is_open) {
+        if n >= *rounds.start() && (n >= *rounds.end() || !is_open) {
             let (ratio, n_rounds) = (median(ratios.clone()), ratios.len());
             return Ok(Duel { first: first.outcome(a), second: second.outcome(b), ratio, n_rounds });
         }
     }
 }
 
-/// Whether rounds of these ratios leave open who is faster.
+/// A few rounds of one mind do if their median ratio is as far from 1 as this.
+const BY_FAR: f64 = 4.0 / 3.0;
+/// Else one must lead by so many standard deviations of a fair coin's tosses.
+const DEVIATIONS: f64 = 3.0;
+
+/// Whether rounds of these ratios leave open who is faster: on a busy machine a round may say what the next denies.
 fn in_doubt(ratios: &[f64]) -> bool {
     let n_above = ratios.iter().filter(|ratio| **ratio > 1.0).count();
-    let n_dissenting = n_above.min(ratios.len() - n_above);
-    IN_DOUBT.contains(&median(ratios.to_vec())) || n_dissenting * ROUNDS_A_DISSENT > ratios.len()
+    let lead = n_above.abs_diff(ratios.len() - n_above);
+    let ratio = median(ratios.to_vec());
+    let is_clear = lead == ratios.len() && ratio.max(1.0 / ratio) >= BY_FAR;
+    !is_clear && (lead as f64) < DEVIATIONS * (ratios.len() as f64).sqrt()
 }
 
 /// One scene on one backend.
@@ -123,17 +135,20 @@ impl<'a> Contestant<'a> {
         Contestant { tree, scene, residency: Residency::default(), ms: Vec::new(), prepare_ms: Vec::new() }
     }
 
-    /// A frame from the scene to the picture in memory, selection, order and polygons included; bricks are resident from the
-    /// frame before.
-    pub(super) fn frame(&mut self, backend: &mut dyn Backend) -> Result<(Image<f32>, Drawn), LamarError> {
-        let name = backend.describe().backend;
-        let failed = |source| LamarError::Render { backend: name, source };
+    /// A frame that is not timed: it brings the bricks.
+    fn warm_up(&mut self, backend: &mut dyn Backend) -> Result<(), LamarError> {
         let plan = prepare(self.tree, self.scene, &mut self.residency)?;
-        backend.render(&plan).map_err(failed)?;
+        backend.render(&plan).map_err(failed(backend))?;
+        Ok(())
+    }
+
+    /// A frame from the scene to the picture in memory, selection, order and polygons included. Its bricks are resident if the
+    /// backend's frame before was this contestant's, too.
+    pub(super) fn frame(&mut self, backend: &mut dyn Backend) -> Result<(Image<f32>, Drawn), LamarError> {
         let begin = Instant::now();
         let plan = prepare(self.tree, self.scene, &mut self.residency)?;
         self.prepare_ms.push(begin.elapsed().as_secs_f64() * 1e3);
-        let image = backend.render(&plan).map_err(failed)?.image;
+        let image = backend.render(&plan).map_err(failed(backend))?.image;
         self.ms.push(begin.elapsed().as_secs_f64() * 1e3);
         let drawn = Drawn {
             n_bricks: plan.bricks.n_bricks() as usize,
@@ -169,6 +184,12 @@ impl Judge {
     }
 }
 
+/// What a backend's failure becomes.
+fn failed(backend: &dyn Backend) -> impl FnOnce(RenderError) -> LamarError + use<> {
+    let name = backend.describe().backend;
+    move |source| LamarError::Render { backend: name, source }
+}
+
 fn spread(ms: &[f64]) -> Spread {
     let (min, max) = ms.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
     Spread { median: median(ms.to_vec()), min, max }
@@ -186,11 +207,16 @@ mod tests {
 
     #[test]
     fn who_is_faster_is_open_while_it_is_close_or_rounds_disagree() {
-        assert!(!in_doubt(&[1.2, 2.0, 1.5]) && !in_doubt(&[0.5, 0.6, 0.7]));
-        assert!(in_doubt(&[1.1, 1.12, 1.2]) && in_doubt(&[0.9, 0.8, 0.95]));
-        // Most of them clear, but not of one mind.
-        assert!(in_doubt(&[0.8, 0.7, 0.5, 1.3]));
-        assert!(in_doubt(&[0.8, 0.7, 0.5, 0.6, 0.8, 0.8, 1.3]));
-        assert!(!in_doubt(&[0.8, 0.7, 0.5, 0.6, 0.8, 0.8, 0.8, 1.3]));
+        // By far, and of one mind.
+        assert!(!in_doubt(&[1.2, 2.0, 1.5]) && !in_doubt(&[0.5, 0.6, 0.8]));
+        assert!(in_doubt(&[1.1, 1.2, 1.3]) && in_doubt(&[0.8, 0.8, 0.9]));
+        // By far, but not of one mind.
+        assert!(in_doubt(&[0.8, 0.7, 0.5, 1.3]) && in_doubt(&[1.3, 1.4, 1.6, 0.9]));
+        // By little, but again and again.
+        assert!(in_doubt(&[1.01; 8]) && in_doubt(&[0.99; 8]));
+        assert!(!in_doubt(&[1.01; 9]) && !in_doubt(&[0.99; 9]));
+        let with_dissent = |n_above, n_below| [vec![1.1; n_above], vec![0.9; n_below]].concat();
+        assert!(in_doubt(&with_dissent(30, 12)) && in_doubt(&with_dissent(12, 30)));
+        assert!(!in_doubt(&with_dissent(31, 11)) && !in_doubt(&with_dissent(11, 31)));
     }
 }

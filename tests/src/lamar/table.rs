@@ -99,6 +99,9 @@ fn of_seat(args: &LamarArgs, rivals: &mut Rivals, seat: &Seat<'_>) -> Result<Vec
     Ok(rows)
 }
 
+/// Most rounds of a row in which it stays in doubt which is faster, for each that is asked for.
+const MOST_ROUNDS: u32 = 27;
+
 /// Fixed and multiresolution take turns.
 fn contest(
     args: &LamarArgs,
@@ -107,7 +110,7 @@ fn contest(
     geometry: Geometry,
     (scenes, judges): (&[Scene; 2], &[Judge; 2]),
 ) -> Result<Row, LamarError> {
-    let duel = duel(seat.tree, scenes, backend, args.frames)?;
+    let duel = duel(seat.tree, scenes, backend, args.frames..=args.frames.saturating_mul(MOST_ROUNDS))?;
     let cell = |outcome: Outcome, judge: &Judge| -> Result<Cell, LamarError> {
         let (error, complaint) = (distance(&outcome.image, seat.answer)?, judge.complaint(&outcome.image));
         let Outcome { drawn, ms, prepare_ms, .. } = outcome;
