@@ -73,7 +73,7 @@ pub(super) struct Outcome {
     pub(super) prepare_ms: Spread,
 }
 
-/// At least so many rounds, and on to so many while it is in doubt which is faster. Who begins a round ended the one before.
+/// At least so many rounds, and on to so many while it is in doubt which is faster.
 pub(super) fn duel(
     tree: &BrickTree,
     scenes: &[Scene; 2],
@@ -85,15 +85,10 @@ pub(super) fn duel(
     first.warm_up(backend)?;
     loop {
         let (a, b) = match ratios.len() % 2 {
-            0 => {
-                let a = first.frame(backend)?;
-                second.warm_up(backend)?;
-                (a, second.frame(backend)?)
-            }
+            0 => round(&mut first, &mut second, backend)?,
             _ => {
-                let b = second.frame(backend)?;
-                first.warm_up(backend)?;
-                (first.frame(backend)?, b)
+                let (b, a) = round(&mut second, &mut first, backend)?;
+                (a, b)
             }
         };
         ratios.push(first.ms[ratios.len()] / second.ms[ratios.len()]);
@@ -105,6 +100,17 @@ pub(super) fn duel(
             return Ok(Duel { first: first.outcome(a), second: second.outcome(b), ratio, n_rounds });
         }
     }
+}
+
+/// A timed frame of each. Who begins drew the frame before, so only the other has bricks to bring.
+fn round(
+    begins: &mut Contestant,
+    ends: &mut Contestant,
+    backend: &mut dyn Backend,
+) -> Result<(Picture, Picture), LamarError> {
+    let begun = begins.frame(backend)?;
+    ends.warm_up(backend)?;
+    Ok((begun, ends.frame(backend)?))
 }
 
 /// A few rounds of one mind do if their median ratio is as far from 1 as this.
@@ -120,6 +126,9 @@ fn in_doubt(ratios: &[f64]) -> bool {
     let is_clear = lead == ratios.len() && ratio.max(1.0 / ratio) >= BY_FAR;
     !is_clear && (lead as f64) < DEVIATIONS * (ratios.len() as f64).sqrt()
 }
+
+/// A frame's picture, and what it draws.
+type Picture = (Image<f32>, Drawn);
 
 /// One scene on one backend.
 pub(super) struct Contestant<'a> {
@@ -144,7 +153,7 @@ impl<'a> Contestant<'a> {
 
     /// A frame from the scene to the picture in memory, selection, order and polygons included. Its bricks are resident if the
     /// backend's frame before was this contestant's, too.
-    pub(super) fn frame(&mut self, backend: &mut dyn Backend) -> Result<(Image<f32>, Drawn), LamarError> {
+    pub(super) fn frame(&mut self, backend: &mut dyn Backend) -> Result<Picture, LamarError> {
         let begin = Instant::now();
         let plan = prepare(self.tree, self.scene, &mut self.residency)?;
         self.prepare_ms.push(begin.elapsed().as_secs_f64() * 1e3);
@@ -158,7 +167,7 @@ impl<'a> Contestant<'a> {
         Ok((image, drawn))
     }
 
-    fn outcome(self, (image, drawn): (Image<f32>, Drawn)) -> Outcome {
+    fn outcome(self, (image, drawn): Picture) -> Outcome {
         Outcome { image, drawn, ms: spread(&self.ms), prepare_ms: spread(&self.prepare_ms) }
     }
 }

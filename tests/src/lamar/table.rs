@@ -158,7 +158,7 @@ fn line(row: &Row) -> String {
 fn missed(rows: &[Row]) -> Vec<Missed> {
     let name = |r: &Row| format!("{}, {}, {}^3, {}, {}", r.data, r.view, r.side, r.geometry, r.backend);
     let wrong = |r: &Row| r.fixed.complaint.clone().or_else(|| r.multiresolution.complaint.clone());
-    let slower = rows.iter().filter(|r| r.view != "outside").filter_map(|r| {
+    let not_faster = rows.iter().filter(|r| r.view != "outside").filter_map(|r| {
         let Row { fixed, multiresolution, ratio, n_rounds, .. } = r;
         match fixed.drawn == multiresolution.drawn {
             true => Some(format!("{}: the same bricks both ways, {} of them", name(r), fixed.drawn.n_bricks)),
@@ -167,6 +167,6 @@ fn missed(rows: &[Row]) -> Vec<Missed> {
         }
     });
     let wrong = rows.iter().filter_map(|r| wrong(r).map(|why| format!("{}: {why}", name(r))));
-    let (slower, wrong) = (slower.map(Missed::of_times), wrong.map(Missed::of_pictures));
-    slower.chain(wrong).collect()
+    let (not_faster, wrong) = (not_faster.map(Missed::of_times), wrong.map(Missed::of_pictures));
+    not_faster.chain(wrong).collect()
 }
