@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use brickfield::bricks::BrickTree;
 use brickfield::cpu::{ContinuousOptions, Discrete, continuous, discrete};
-use brickfield::frame::{Backend, RenderError};
+use brickfield::frame::{Backend, Feature, RenderError};
 use brickfield::{Residency, Scene, Skipping, Technique, prepare};
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Aabb, Image, Volume};
@@ -24,12 +24,14 @@ pub(super) struct Spread {
     pub(super) max: f64,
 }
 
-/// What a frame draws.
+/// What a frame draws. Frames of one scene, one of them of level 0 alone, draw the same bricks if these are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(super) struct Drawn {
     pub(super) n_bricks: usize,
     pub(super) n_bytes: usize,
     pub(super) n_polygons: usize,
+    /// Whether bricks coarser than level 0 are among them.
+    pub(super) has_coarse: bool,
 }
 
 /// How far a picture is from the answer at full resolution.
@@ -163,6 +165,7 @@ impl<'a> Contestant<'a> {
             n_bricks: plan.bricks.n_bricks() as usize,
             n_bytes: plan.bricks.bytes().len(),
             n_polygons: plan.proxy.as_ref().map_or(0, |proxy| proxy.n_polygons()),
+            has_coarse: plan.features.contains(Feature::MultiLevel),
         };
         Ok((image, drawn))
     }
@@ -212,7 +215,33 @@ pub(super) fn distance(image: &Image<f32>, answer: &Image<f64>) -> Result<Distan
 
 #[cfg(test)]
 mod tests {
+    use brickfield::bricks::{BuildOptions, Downsampling, build_tree};
+    use brickfield::cpu::CpuBackend;
+    use brickfield::lod::Criterion;
+    use brickfield_core::glam::{UVec2, UVec3};
+    use brickfield_core::{BrickSide, Camera, Grid, Knot, Level, ScalarType, TransferFunction};
+
     use super::*;
+    use crate::volumes::fill;
+
+    #[test]
+    fn as_many_bricks_of_another_level_are_not_the_same_bricks() {
+        // Something in one of eight bricks, and so in the one above them.
+        let grid = Grid::axis_aligned(UVec3::splat(31), DVec3::ONE).unwrap();
+        let volume = fill(&grid, ScalarType::U8, |p| (7.0 - (p - 8.5).length()).max(0.0));
+        let options = BuildOptions { side: BrickSide::S16, downsampling: Downsampling::Subsample, max_bytes: None };
+        let tree = build_tree(&volume, &options).unwrap();
+        let knot = |value| Knot { value, extinction: 0.1 * value, color: [1.0; 3] };
+        let camera = Camera::framing(&grid.world_box(), DVec3::new(0.6, -1.0, 0.35), DVec3::Z).unwrap();
+        let transfer = TransferFunction::new(vec![knot(0.0), knot(7.0)]).unwrap();
+        let drawn = |level| {
+            let detail = vec![Criterion::Uniform(Level(level))];
+            let scene = Scene { detail, ..Scene::new(camera, UVec2::splat(8), transfer.clone()) };
+            Contestant::new(&tree, &scene).frame(&mut CpuBackend::new()).unwrap().1
+        };
+        assert_eq!((drawn(0).n_bricks, drawn(1).n_bricks), (1, 1));
+        assert!(drawn(0) == drawn(0) && drawn(0) != drawn(1));
+    }
 
     #[test]
     fn who_is_faster_is_open_while_it_is_close_or_rounds_disagree() {
