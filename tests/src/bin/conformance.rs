@@ -7,7 +7,10 @@ use std::time::Instant;
 
 use anyhow::Context;
 use brickfield::{BackendKind, Validation};
-use brickfield_conformance::conformance::{Case, Contestant, Outcome, Run, SelfCheck, Summary, cases};
+use brickfield_conformance::conformance::{
+    Case, Comparison, Contestant, Outcome, RecordEntry, RecordError, RecordWriter, Run, SelfCheck, Summary, cases,
+    read_record,
+};
 use clap::Parser;
 use serde::Serialize;
 
@@ -35,6 +38,12 @@ struct Options {
     /// Write all outcomes to this file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Keep all pictures and function values in this file, a record to compare a later run with
+    #[arg(long, value_name = "FILE", conflicts_with = "self_check")]
+    digests: Option<PathBuf>,
+    /// Compare all pictures and function values with those of an earlier run's record; one that has changed fails the run
+    #[arg(long, value_name = "FILE", conflicts_with = "self_check")]
+    against: Option<PathBuf>,
     /// Where pictures of failing cases go
     #[arg(long, value_name = "FOLDER", default_value = "target/conformance")]
     pictures: PathBuf,
@@ -58,7 +67,9 @@ fn main() -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let begin = Instant::now();
-    let mut outcomes = if options.self_check { self_check(&options, &cases) } else { run(&options, &cases) };
+    let mut keeper = Keeper::new(&options)?;
+    let mut outcomes =
+        if options.self_check { self_check(&options, &cases) } else { run(&options, &cases, &mut keeper) };
     // With all cases out of sight there is nothing to be green about.
     if outcomes.is_empty() {
         println!("no case matches {:?}", options.case);
@@ -70,7 +81,57 @@ fn main() -> anyhow::Result<ExitCode> {
         let text = serde_json::to_string_pretty(&report)?;
         fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))?;
     }
-    Ok(if summary.is_green() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    let has_changes = keeper.finish(&options)?;
+    Ok(if summary.is_green() && !has_changes { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// What becomes of answers: they are written to a record, compared with an earlier one, or both.
+struct Keeper {
+    writer: Option<RecordWriter>,
+    comparison: Option<Comparison>,
+    /// The first failure of writing.
+    failed: Result<(), RecordError>,
+}
+
+impl Keeper {
+    /// Reads the earlier record before it creates one: both may be one file.
+    fn new(options: &Options) -> Result<Keeper, RecordError> {
+        let earlier = options.against.as_deref().map(read_record).transpose()?;
+        let writer = options.digests.as_deref().map(RecordWriter::create).transpose()?;
+        Ok(Keeper { writer, comparison: earlier.map(Comparison::with), failed: Ok(()) })
+    }
+
+    fn keep(&mut self, answer: &RecordEntry) {
+        if let (Some(writer), true) = (&mut self.writer, self.failed.is_ok()) {
+            self.failed = writer.write(answer);
+        }
+        if let Some(line) = self.comparison.as_mut().and_then(|comparison| comparison.hold(answer)) {
+            println!("{line}");
+        }
+    }
+
+    /// Completes the record and sums up the comparison; whether an answer has changed.
+    fn finish(self, options: &Options) -> Result<bool, RecordError> {
+        self.failed?;
+        if let (Some(writer), Some(path)) = (self.writer, &options.digests) {
+            println!("record {}: {:.1} MB", path.display(), writer.finish()? as f64 / 1e6);
+        }
+        let Some(mut comparison) = self.comparison else { return Ok(false) };
+        comparison.gone(|answer| is_asked_for(options, answer)).iter().for_each(|line| println!("{line}"));
+        println!("against the record: {comparison}");
+        Ok(comparison.has_changes())
+    }
+}
+
+/// Whether a run with these options gives this answer, if the code still has its case and the machine its backend.
+fn is_asked_for(options: &Options, answer: &RecordEntry) -> bool {
+    let kind = BackendKind::ALL.into_iter().find(|kind| answer.backend.starts_with(&format!("{kind}@")));
+    let is_case = options.case.is_empty() || options.case.iter().any(|text| answer.case.contains(text.as_str()));
+    is_case && kind.is_none_or(|kind| is_wanted(options, kind))
+}
+
+fn is_wanted(options: &Options, kind: BackendKind) -> bool {
+    options.backend.is_empty() || options.backend.contains(&kind) || options.require.contains(&kind)
 }
 
 fn chosen(texts: &[String]) -> Vec<Case> {
@@ -87,20 +148,18 @@ fn list(cases: &[Case]) {
 
 fn contestants(options: &Options) -> Vec<Contestant> {
     let validation = if options.validation { Validation::On } else { Validation::Off };
-    let wanted = |kind: &BackendKind| {
-        options.backend.is_empty() || options.backend.contains(kind) || options.require.contains(kind)
-    };
-    let kinds = BackendKind::ALL.into_iter().filter(wanted);
+    let kinds = BackendKind::ALL.into_iter().filter(|kind| is_wanted(options, *kind));
     kinds.flat_map(|kind| Contestant::all(kind, options.adapter.as_deref(), validation)).collect()
 }
 
-fn run(options: &Options, cases: &[Case]) -> Vec<Outcome> {
+fn run(options: &Options, cases: &[Case], keeper: &mut Keeper) -> Vec<Outcome> {
     let mut run = Run {
         contestants: contestants(options),
         required: options.require.clone(),
         pictures: options.pictures.clone(),
     };
-    cases.iter().flat_map(|case| run.case(case, &mut |outcome| println!("{outcome}"))).collect()
+    let mut keep = |answer: RecordEntry| keeper.keep(&answer);
+    cases.iter().flat_map(|case| run.case(case, &mut |outcome| println!("{outcome}"), &mut keep)).collect()
 }
 
 fn self_check(options: &Options, cases: &[Case]) -> Vec<Outcome> {

@@ -6,10 +6,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use brickfield::cpu::{Discrete, discrete};
 use brickfield::frame::{Capabilities, RenderError};
 use brickfield_core::Image;
+use brickfield_core::glam::UVec2;
 
 use super::case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, Plans, Shows, Subject};
 use super::contestant::Contestant;
 use super::naive::naive;
+use super::record::RecordEntry;
 use super::rule::{Complaint, Tolerance, Verdict, bounded};
 
 /// A case that is ready to be run on any backend.
@@ -46,8 +48,22 @@ pub enum Judged {
     Panicked(String),
     /// A picture, and what the rules say.
     Picture(Image<f32>, Verdict),
-    /// What a function returned was held against its equation: greatest difference in units of its tolerance.
-    Function(Result<f64, String>),
+    /// A function's outputs, held against its equation: greatest difference in units of its tolerance.
+    Function(Vec<[f32; 4]>, Result<f64, String>),
+}
+
+impl Judged {
+    /// What the backend answered, to be kept: a picture, or a function's outputs as a picture of one row.
+    pub fn answer(&self, case: &str, backend: &str) -> Option<RecordEntry> {
+        let (size, values) = match self {
+            Judged::Picture(image, _) => (image.size(), image.pixels()),
+            Judged::Function(outputs, _) => (UVec2::new(outputs.len() as u32, 1), outputs.as_slice()),
+            _ => return None,
+        };
+        let answer =
+            || RecordEntry { case: case.to_owned(), backend: backend.to_owned(), size, values: values.to_vec() };
+        (!values.is_empty()).then(answer)
+    }
 }
 
 /// How far the reference may be from the volume's own sum: f64, in another order.
@@ -184,7 +200,7 @@ fn run_picture(
 
 fn refused(complaint: Complaint) -> Judged {
     let verdict = Verdict { errors: None, closest: None, used: f64::INFINITY, complaint: Some(complaint) };
-    Judged::Picture(Image::transparent(brickfield_core::glam::UVec2::ZERO), verdict)
+    Judged::Picture(Image::transparent(UVec2::ZERO), verdict)
 }
 
 fn run_function(test: &FunctionTest, on: &mut Contestant, mutant: Option<&Mutant>) -> Judged {
@@ -196,7 +212,10 @@ fn run_function(test: &FunctionTest, on: &mut Contestant, mutant: Option<&Mutant
     match evaluated {
         None => Judged::Absent,
         Some(Err(e)) => failed(e),
-        Some(Ok(outputs)) => Judged::Function(hold(test, &outputs)),
+        Some(Ok(outputs)) => {
+            let held = hold(test, &outputs);
+            Judged::Function(outputs, held)
+        }
     }
 }
 

@@ -5,6 +5,7 @@
 //! - `naive`: a second opinion on the reference itself, straight from the volume's voxels.
 //! - [`PlanMutant`], [`ShaderMutant`]: backends with one thing wrong; [`SelfCheck`] runs them.
 //! - [`Run`], [`Outcome`], [`Summary`]: pass, fail, unsupported, no-device, no-data. Absence is reported, never passed.
+//! - [`RecordWriter`], [`Comparison`]: a record of all answers, and a later run held against it.
 
 mod case;
 mod cases;
@@ -14,6 +15,7 @@ mod naive;
 mod outcome;
 mod pictures;
 mod plan_mutants;
+mod record;
 mod rule;
 mod run;
 mod samples;
@@ -28,6 +30,7 @@ pub use contestant::Contestant;
 pub use outcome::{Outcome, Status, Summary};
 pub use pictures::write_difference;
 pub use plan_mutants::PlanMutant;
+pub use record::{Comparison, Difference, RecordEntry, RecordError, RecordWriter, read_record};
 pub use rule::{Complaint, Tolerance, Verdict};
 pub use run::Run;
 pub use self_check::SelfCheck;

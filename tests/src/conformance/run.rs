@@ -11,6 +11,7 @@ use super::check::{Judged, Obstacle, Prepared};
 use super::contestant::Contestant;
 use super::outcome::{Outcome, Status};
 use super::pictures::write_difference;
+use super::record::RecordEntry;
 use super::rule::Verdict;
 
 /// What a run is asked for.
@@ -24,8 +25,13 @@ pub struct Run {
 }
 
 impl Run {
-    /// Runs a case on every backend; `observe` sees each outcome as it comes.
-    pub fn case(&mut self, case: &Case, observe: &mut dyn FnMut(&Outcome)) -> Vec<Outcome> {
+    /// Runs a case on every backend; `observe` sees each outcome as it comes, `keep` each answer.
+    pub fn case(
+        &mut self,
+        case: &Case,
+        observe: &mut dyn FnMut(&Outcome),
+        keep: &mut dyn FnMut(RecordEntry),
+    ) -> Vec<Outcome> {
         let prepared = match Prepared::of(case) {
             Ok(prepared) => prepared,
             Err(obstacle) => return self.not_prepared(case, &obstacle, observe),
@@ -35,6 +41,7 @@ impl Run {
         for contestant in &mut self.contestants {
             let begin = Instant::now();
             let judged = prepared.run(contestant, None);
+            judged.answer(&case.name, &contestant.name()).into_iter().for_each(&mut *keep);
             let (mut outcome, image) = told(case, contestant, judged, &prepared, &self.required, &self.pictures);
             outcome.milliseconds = begin.elapsed().as_secs_f64() * 1e3;
             observe(&outcome);
@@ -110,8 +117,8 @@ fn told(
         Judged::Unsupported(e) => plain(Status::Unsupported, e.to_string()),
         Judged::Broken(e) => plain(Status::Fail, e.to_string()),
         Judged::Panicked(words) => plain(Status::Fail, format!("panicked: {words}")),
-        Judged::Function(Ok(worst)) => plain(Status::Pass, format!("at most {worst:.2} of the tolerance")),
-        Judged::Function(Err(e)) => plain(Status::Fail, e),
+        Judged::Function(_, Ok(worst)) => plain(Status::Pass, format!("at most {worst:.2} of the tolerance")),
+        Judged::Function(_, Err(e)) => plain(Status::Fail, e),
         Judged::Picture(image, verdict) => {
             let mut outcome = of_verdict(case, &backend, &verdict);
             if let (Status::Fail, Some(reference)) = (outcome.status, prepared.reference()) {
