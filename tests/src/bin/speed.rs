@@ -3,6 +3,7 @@
 //! Times are printed, not asserted, unless `--check` is given: then the ratios that the project promises must hold.
 
 use std::fs;
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -42,6 +43,9 @@ struct Options {
     /// Fail if a promised ratio is missed
     #[arg(long)]
     check: bool,
+    /// Time nothing, but render frames on request, for the `speed` of another build
+    #[arg(long, conflicts_with_all = ["check", "json"])]
+    serve: bool,
     /// Write the table to this file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -104,11 +108,18 @@ impl<'a> Contestant<'a> {
 
 type Backends = Vec<(BackendKind, Box<dyn Backend>)>;
 
+/// Name, path, and how many times as fast skipping must be.
+const VOLUMES: [(&str, &str, f64); 2] = [("engine", "ct/engine.vti", 2.0), ("aneurism", "ct/aneurism.vti", 4.0)];
+
 fn main() -> anyhow::Result<ExitCode> {
     let options = Options::parse();
     let mut table = Table::default();
     let mut backends = opened(&options);
-    for (name, path, at_least) in [("engine", "ct/engine.vti", 2.0), ("aneurism", "ct/aneurism.vti", 4.0)] {
+    if options.serve {
+        serve(&options, &mut backends)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    for (name, path, at_least) in VOLUMES {
         let volume = read(&options, path)?;
         skipping(&options, name, at_least, &volume, &mut backends, &mut table)?;
         sides(&options, name, &volume, &mut backends, &mut table)?;
@@ -135,13 +146,68 @@ fn opened(options: &Options) -> Backends {
         match open_backend(kind, options.adapter.as_deref(), Validation::Off) {
             Ok(backend) => {
                 let d = backend.describe();
-                println!("{kind}: {}, {}", d.adapter, d.driver);
+                say(options, &format!("{kind}: {}, {}", d.adapter, d.driver));
                 backends.push((kind, backend));
             }
-            Err(e) => println!("{kind}: absent: {e}"),
+            Err(e) => say(options, &format!("{kind}: absent: {e}")),
         }
     }
     backends
+}
+
+/// A line for people: standard output belongs to the asking program while frames are served.
+fn say(options: &Options, line: &str) {
+    match options.serve {
+        true => eprintln!("{line}"),
+        false => println!("{line}"),
+    }
+}
+
+/// A contestant, as it is named to the asking program.
+#[derive(Serialize)]
+struct Offer<'a> {
+    what: &'a str,
+    backend: &'static str,
+}
+
+/// Renders frames on request. First a line of JSON for each contestant ([`Offer`]), and an empty line. Then for each line of
+/// standard input, which is a contestant's number from 0, the milliseconds of a frame of it, until the input ends.
+fn serve(options: &Options, backends: &mut Backends) -> anyhow::Result<()> {
+    let volumes = VOLUMES.iter().map(|(name, path, _)| Ok((*name, read(options, path)?)));
+    let volumes = volumes.collect::<anyhow::Result<Vec<(&str, Volume)>>>()?;
+    let trees = volumes.iter().map(|(_, volume)| all_sides(volume)).collect::<anyhow::Result<Vec<_>>>()?;
+    let mut contestants = Vec::new();
+    for ((name, volume), trees) in volumes.iter().zip(&trees) {
+        let middle = &trees.iter().find(|(side, _)| *side == BrickSide::S32).context("bricks of 32")?.1;
+        for (what, scene) in skipping_scenes(options, volume)? {
+            contestants.extend(Contestant::on_each(&format!("{name}, {what}"), middle, &scene, backends));
+        }
+        for (side, tree) in trees {
+            for (what, scene) in side_scenes(options, volume, *side)? {
+                contestants.extend(Contestant::on_each(&format!("{name}, {what}"), tree, &scene, backends));
+            }
+        }
+    }
+    contestants.retain(|c| options.only.as_ref().is_none_or(|only| c.what.contains(only)));
+    let mut out = std::io::stdout();
+    for c in &contestants {
+        let offer = Offer { what: &c.what, backend: backends[c.backend].0.name() };
+        writeln!(out, "{}", serde_json::to_string(&offer)?)?;
+    }
+    writeln!(out)?;
+    let mut latest = vec![None; backends.len()];
+    for line in std::io::stdin().lines() {
+        let i: usize = line?.trim().parse().context("a contestant's number")?;
+        let contestant = contestants.get_mut(i).with_context(|| format!("no contestant {i}"))?;
+        let (latest, backend) = (&mut latest[contestant.backend], &mut backends[contestant.backend].1);
+        // A backend holds one set of bricks: a frame that brings them is not timed.
+        if *latest != Some(i) {
+            contestant.frame(backend.as_mut())?;
+            *latest = Some(i);
+        }
+        writeln!(out, "{}", contestant.frame(backend.as_mut())?)?;
+    }
+    Ok(())
 }
 
 fn read(options: &Options, path: &str) -> anyhow::Result<Volume> {
@@ -158,6 +224,34 @@ fn scene(options: &Options, volume: &Volume, mode: Mode, skipping: Skipping) -> 
     Ok(Scene { mode, skipping, step_voxels: 0.5, ..Scene::new(camera, size, automatic(volume)) })
 }
 
+/// With and without skipping in both modes, and a scene that shows nothing.
+fn skipping_scenes(options: &Options, volume: &Volume) -> anyhow::Result<[(&'static str, Scene); 5]> {
+    let invisible = Scene {
+        transfer: TransferFunction::constant(0.0, [1.0; 3])?,
+        ..scene(options, volume, Mode::FAST, Skipping::On)?
+    };
+    Ok([
+        ("fast, skipping", scene(options, volume, Mode::FAST, Skipping::On)?),
+        ("fast, no skipping", scene(options, volume, Mode::FAST, Skipping::Off)?),
+        ("exact, skipping", scene(options, volume, Mode::Exact, Skipping::On)?),
+        ("exact, no skipping", scene(options, volume, Mode::Exact, Skipping::Off)?),
+        ("nothing to see", invisible),
+    ])
+}
+
+/// Both modes in bricks of one side.
+fn side_scenes(options: &Options, volume: &Volume, side: BrickSide) -> anyhow::Result<[(String, Scene); 2]> {
+    Ok([
+        (format!("fast, bricks of {side}"), scene(options, volume, Mode::FAST, Skipping::On)?),
+        (format!("exact, bricks of {side}"), scene(options, volume, Mode::Exact, Skipping::On)?),
+    ])
+}
+
+/// The octrees of a volume, one for each brick side.
+fn all_sides(volume: &Volume) -> anyhow::Result<Vec<(BrickSide, BrickTree)>> {
+    BrickSide::ALL.into_iter().map(|side| Ok((side, tree(volume, side)?))).collect()
+}
+
 /// Skipping on against off in fast mode and in exact mode, and a frame that shows nothing, on every backend.
 fn skipping(
     options: &Options,
@@ -168,17 +262,7 @@ fn skipping(
     table: &mut Table,
 ) -> anyhow::Result<()> {
     let tree = tree(volume, BrickSide::S32)?;
-    let invisible = Scene {
-        transfer: TransferFunction::constant(0.0, [1.0; 3])?,
-        ..scene(options, volume, Mode::FAST, Skipping::On)?
-    };
-    let scenes = [
-        ("fast, skipping", scene(options, volume, Mode::FAST, Skipping::On)?),
-        ("fast, no skipping", scene(options, volume, Mode::FAST, Skipping::Off)?),
-        ("exact, skipping", scene(options, volume, Mode::Exact, Skipping::On)?),
-        ("exact, no skipping", scene(options, volume, Mode::Exact, Skipping::Off)?),
-        ("nothing to see", invisible),
-    ];
+    let scenes = skipping_scenes(options, volume)?;
     let mut contestants = Vec::new();
     for (what, scene) in &scenes {
         contestants.extend(Contestant::on_each(&format!("{name}, {what}"), &tree, scene, backends));
@@ -245,18 +329,16 @@ fn sides(
     backends: &mut Backends,
     table: &mut Table,
 ) -> anyhow::Result<()> {
-    let trees = BrickSide::ALL.into_iter().map(|side| tree(volume, side)).collect::<anyhow::Result<Vec<_>>>()?;
+    let trees = all_sides(volume)?;
     let mut contestants = Vec::new();
-    for (side, tree) in BrickSide::ALL.into_iter().zip(&trees) {
-        for (mode, mode_name) in [(Mode::FAST, "fast"), (Mode::Exact, "exact")] {
-            let scene = scene(options, volume, mode, Skipping::On)?;
+    for (side, tree) in &trees {
+        for (what, scene) in side_scenes(options, volume, *side)? {
             let bricks = prepare(tree, &scene, &mut Residency::default())?.bricks;
-            if mode == Mode::Exact {
+            if scene.mode == Mode::Exact {
                 let megabytes = bricks.bytes().len() as f64 / 1e6;
                 println!("{name}, bricks of {side}: {} resident, {megabytes:.1} MB", bricks.n_bricks());
             }
-            let what = format!("{name}, {mode_name}, bricks of {side}");
-            contestants.extend(Contestant::on_each(&what, tree, &scene, backends));
+            contestants.extend(Contestant::on_each(&format!("{name}, {what}"), tree, &scene, backends));
         }
     }
     table.times.extend(alternate(options, &mut contestants, backends)?);
