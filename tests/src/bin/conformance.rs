@@ -9,12 +9,12 @@ use anyhow::Context;
 use brickfield::{BackendKind, Validation};
 use brickfield_conformance::conformance::{
     Case, Comparison, Contestant, Outcome, RecordEntry, RecordError, RecordWriter, Run, SelfCheck, Summary, cases,
-    read_record,
+    for_each_prepared, read_record,
 };
 use clap::Parser;
 use serde::Serialize;
 
-/// Holds every backend to the f64 answer, case by case; or the cases to their mutants (--self-check)
+/// Holds every backend to the f64 answer, case by case; with --self-check also the cases to their mutants
 #[derive(Parser)]
 struct Options {
     /// Backends whose absence is a failure, separated by commas: cpu, wgpu, ash
@@ -29,7 +29,7 @@ struct Options {
     /// Only cases whose name holds this text; may be repeated
     #[arg(long, value_name = "TEXT")]
     case: Vec<String>,
-    /// Run the mutants: every case must catch those that it names, every mutant must be caught
+    /// Run the mutants, too: every case must catch those that it names, every mutant must be caught
     #[arg(long)]
     self_check: bool,
     /// Have the driver's validation layer check every call
@@ -39,10 +39,10 @@ struct Options {
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Keep all pictures and function values in this file, a record to compare a later run with
-    #[arg(long, value_name = "FILE", conflicts_with = "self_check")]
+    #[arg(long, value_name = "FILE")]
     digests: Option<PathBuf>,
     /// Compare all pictures and function values with those of an earlier run's record; one that has changed fails the run
-    #[arg(long, value_name = "FILE", conflicts_with = "self_check")]
+    #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
     /// Where pictures of failing cases go
     #[arg(long, value_name = "FOLDER", default_value = "target/conformance")]
@@ -68,8 +68,7 @@ fn main() -> anyhow::Result<ExitCode> {
     }
     let begin = Instant::now();
     let mut keeper = Keeper::new(&options)?;
-    let mut outcomes =
-        if options.self_check { self_check(&options, &cases) } else { run(&options, &cases, &mut keeper) };
+    let mut outcomes = run(&options, &cases, &mut keeper);
     // With all cases out of sight there is nothing to be green about.
     if outcomes.is_empty() {
         println!("no case matches {:?}", options.case);
@@ -152,39 +151,35 @@ fn contestants(options: &Options) -> Vec<Contestant> {
     kinds.flat_map(|kind| Contestant::all(kind, options.adapter.as_deref(), validation)).collect()
 }
 
+/// Runs each case on all backends, and then, if asked for, against its mutants.
 fn run(options: &Options, cases: &[Case], keeper: &mut Keeper) -> Vec<Outcome> {
     let mut run = Run {
         contestants: contestants(options),
         required: options.require.clone(),
         pictures: options.pictures.clone(),
     };
-    let mut keep = |answer: RecordEntry| keeper.keep(&answer);
-    cases.iter().flat_map(|case| run.case(case, &mut |outcome| println!("{outcome}"), &mut keep)).collect()
-}
-
-fn self_check(options: &Options, cases: &[Case]) -> Vec<Outcome> {
-    let mut contestants = contestants(options);
-    let mut outcomes = absences(options, &contestants);
-    let mut check = SelfCheck::new(&mut contestants);
-    for case in cases {
-        let outcome = check.case(case);
-        println!("{outcome}");
-        outcomes.push(outcome);
+    let mut check = options.self_check.then(SelfCheck::default);
+    let mut outcomes = Vec::new();
+    for_each_prepared(cases, |case, mut prepared| {
+        let mut keep = |answer: RecordEntry| keeper.keep(&answer);
+        outcomes.extend(run.case(case, &mut prepared, &mut |outcome| println!("{outcome}"), &mut keep));
+        if let Some(check) = &mut check {
+            let outcome = check.case(case, &mut prepared, &mut run.contestants);
+            println!("{outcome}");
+            outcomes.push(outcome);
+        }
+    });
+    if let Some(check) = check {
+        outcomes.extend(uncaught(options, &check, &run.contestants));
     }
-    // A part of the cases need not catch all mutants.
-    let uncaught = if options.case.is_empty() { check.uncaught() } else { Vec::new() };
-    uncaught.iter().for_each(|o| println!("{o}"));
-    outcomes.extend(uncaught);
-    let (n_caught, n) = check.n_caught();
-    println!("{n_caught} of {n} mutants caught");
     outcomes
 }
 
-/// Required backends that are absent fail a self-check, too.
-fn absences(options: &Options, contestants: &[Contestant]) -> Vec<Outcome> {
-    use brickfield_conformance::conformance::Status;
-    let missing = contestants.iter().filter(|c| options.require.contains(&c.kind()));
-    let outcomes = missing.filter_map(|c| Some((c, c.absence()?)));
-    let outcomes = outcomes.map(|(c, why)| Outcome::plain("required", &c.name(), Status::Fail, why));
-    outcomes.inspect(|o| println!("{o}")).collect()
+/// Mutants that no case has caught; a part of the cases need not catch all.
+fn uncaught(options: &Options, check: &SelfCheck, backends: &[Contestant]) -> Vec<Outcome> {
+    let uncaught = if options.case.is_empty() { check.uncaught(backends) } else { Vec::new() };
+    uncaught.iter().for_each(|outcome| println!("{outcome}"));
+    let (n_caught, n) = check.n_caught();
+    println!("{n_caught} of {n} mutants caught");
+    uncaught
 }

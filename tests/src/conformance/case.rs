@@ -25,9 +25,9 @@ pub struct Case {
 /// What a case does.
 pub enum Check {
     /// Renders a scene.
-    Picture(Box<dyn Fn() -> Result<Subject, NoData>>),
+    Picture(Box<dyn Fn() -> Result<Subject, NoData> + Send + Sync>),
     /// Evaluates one function on a list of inputs.
-    Function(Box<dyn Fn() -> FunctionTest>),
+    Function(Box<dyn Fn() -> FunctionTest + Send + Sync>),
 }
 
 /// A backend with one thing wrong.

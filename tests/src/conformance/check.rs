@@ -1,10 +1,11 @@
 //! Runs one case: makes what is asked, and judges what comes back.
 
 use std::any::Any;
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use brickfield::cpu::{Discrete, discrete};
-use brickfield::frame::{Capabilities, RenderError};
+use brickfield::frame::{Capabilities, Mode, RenderError};
 use brickfield_core::Image;
 use brickfield_core::glam::UVec2;
 
@@ -12,7 +13,7 @@ use super::case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, Plans, Show
 use super::contestant::Contestant;
 use super::naive::naive;
 use super::record::RecordEntry;
-use super::rule::{Complaint, Tolerance, Verdict, bounded};
+use super::rule::{Complaint, PlanTolerance, Tolerance, Verdict, bounded};
 
 /// A case that is ready to be run on any backend.
 pub struct Prepared {
@@ -20,8 +21,18 @@ pub struct Prepared {
 }
 
 enum Work {
-    Picture { subject: Box<Subject>, plans: Box<Plans>, reference: Discrete },
+    Picture(Box<Picture>),
     Function(Box<FunctionTest>),
+}
+
+/// A picture case's plans, its reference, and how far a picture may be from it.
+struct Picture {
+    subject: Subject,
+    plans: Plans,
+    reference: Discrete,
+    tolerance: Result<PlanTolerance, Complaint>,
+    /// By [`Picture::device_key`], as backends ask for them.
+    on_devices: BTreeMap<Option<u32>, Tolerance>,
 }
 
 /// Why a case could not be prepared.
@@ -78,12 +89,14 @@ impl Prepared {
         let work = match &case.check {
             Check::Function(test) => Work::Function(Box::new(test())),
             Check::Picture(subject) => {
-                let subject = Box::new(subject()?);
-                let plans = Box::new(subject.plans()?);
+                let subject = subject()?;
+                let plans = subject.plans()?;
                 let reference = discrete(&plans.complete);
                 check_blank(&subject, &reference)?;
                 check_oracle(&subject, &reference)?;
-                Work::Picture { subject, plans, reference }
+                let tolerance = PlanTolerance::of(&plans.replayed, &reference);
+                let on_devices = BTreeMap::new();
+                Work::Picture(Box::new(Picture { subject, plans, reference, tolerance, on_devices }))
             }
         };
         Ok(Prepared { work })
@@ -92,18 +105,18 @@ impl Prepared {
     /// The reference picture, if the case has one.
     pub fn reference(&self) -> Option<&Image<f64>> {
         match &self.work {
-            Work::Picture { reference, .. } => Some(&reference.image),
+            Work::Picture(picture) => Some(&picture.reference.image),
             Work::Function(_) => None,
         }
     }
 
     /// Runs the case on a backend; with a mutant, on the plan that the mutant makes of it. (Shader mutants are in the
     /// backend.)
-    pub fn run(&self, on: &mut Contestant, mutant: Option<&Mutant>) -> Judged {
+    pub fn run(&mut self, on: &mut Contestant, mutant: Option<&Mutant>) -> Judged {
         let Some(capabilities) = on.capabilities() else { return Judged::Absent };
-        let run = AssertUnwindSafe(|| match &self.work {
+        let run = AssertUnwindSafe(|| match &mut self.work {
             Work::Function(test) => run_function(test, on, mutant),
-            Work::Picture { plans, reference, .. } => run_picture(plans, reference, &capabilities, on, mutant),
+            Work::Picture(picture) => run_picture(picture, &capabilities, on, mutant),
         });
         // A backend that panics fails its case, not the run.
         catch_unwind(run).unwrap_or_else(|payload| Judged::Panicked(words(payload.as_ref())))
@@ -112,8 +125,8 @@ impl Prepared {
     /// The scene in a few words.
     pub fn describe(&self) -> String {
         match &self.work {
-            Work::Picture { subject, plans, .. } => {
-                let (scene, plan) = (&subject.scene, &plans.replayed);
+            Work::Picture(picture) => {
+                let (scene, plan) = (&picture.subject.scene, &picture.plans.replayed);
                 let (n, size) = (plan.bricks.n_bricks(), scene.size);
                 format!("{} x {} pixels, {n} bricks, {}, {}", size.x, size.y, scene.rule.name(), scene.mode.name())
             }
@@ -167,18 +180,32 @@ fn stored_rounding(subject: &Subject) -> f64 {
     }
 }
 
+impl Picture {
+    /// What a tolerance depends on besides the plan: in fast mode the bits of the device's filter weights.
+    fn device_key(&self, device: &Capabilities) -> Option<u32> {
+        matches!(self.plans.replayed.sampling.mode(), Mode::Fast { .. }).then_some(device.sub_texel_bits)
+    }
+
+    /// Works out the tolerance on a device, unless it is known.
+    fn meet(&mut self, device: &Capabilities) -> Result<(), Complaint> {
+        let tolerance = self.tolerance.as_ref().map_err(Complaint::clone)?;
+        let on = || tolerance.on(&self.plans.replayed, &self.reference, device.sub_texel_bits);
+        self.on_devices.entry(self.device_key(device)).or_insert_with(on);
+        Ok(())
+    }
+}
+
 fn run_picture(
-    plans: &Plans,
-    reference: &Discrete,
+    picture: &mut Picture,
     capabilities: &Capabilities,
     on: &mut Contestant,
     mutant: Option<&Mutant>,
 ) -> Judged {
-    let tolerance = Tolerance::of(&plans.replayed, reference, capabilities);
-    let tolerance = match tolerance {
-        Ok(tolerance) => tolerance,
-        Err(complaint) => return refused(complaint),
-    };
+    if let Err(complaint) = picture.meet(capabilities) {
+        return refused(complaint);
+    }
+    let Picture { plans, reference, on_devices, .. } = &*picture;
+    let tolerance = &on_devices[&picture.device_key(capabilities)];
     let rendered = match mutant {
         Some(Mutant::Plan(mutant)) => on.render(&mutant.apply(&plans.replayed)),
         _ => on.render(&plans.replayed),

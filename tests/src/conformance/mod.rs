@@ -7,6 +7,7 @@
 //! - [`Run`], [`Outcome`], [`Summary`]: pass, fail, unsupported, no-device, no-data. Absence is reported, never passed.
 //! - [`RecordWriter`], [`Comparison`]: a record of all answers, and a later run held against it.
 
+mod ahead;
 mod case;
 mod cases;
 mod check;
@@ -23,6 +24,7 @@ mod self_check;
 pub mod shader_mutants;
 mod surfaces;
 
+pub use ahead::for_each_prepared;
 pub use case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, Plans, Point, Shows, Subject};
 pub use cases::all as cases;
 pub use check::{Judged, Obstacle, Prepared};
@@ -31,7 +33,7 @@ pub use outcome::{Outcome, Status, Summary};
 pub use pictures::write_difference;
 pub use plan_mutants::PlanMutant;
 pub use record::{Comparison, Difference, RecordEntry, RecordError, RecordWriter, read_record};
-pub use rule::{Complaint, Tolerance, Verdict};
+pub use rule::{Complaint, PlanTolerance, Tolerance, Verdict};
 pub use run::Run;
 pub use self_check::SelfCheck;
 pub use shader_mutants::ShaderMutant;

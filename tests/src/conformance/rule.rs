@@ -38,6 +38,15 @@ pub struct Tolerance {
     bulk: Vec<f64>,
 }
 
+/// The rule for a plan, as far as it does not depend on a device.
+#[derive(Clone, Debug)]
+pub struct PlanTolerance {
+    /// The wide bound of exact mode.
+    wide: f64,
+    /// In exact mode.
+    tolerance: Tolerance,
+}
+
 /// How far a picture was from what was asked, and what the rule says.
 #[derive(Clone, Debug)]
 pub struct Verdict {
@@ -73,27 +82,41 @@ pub enum Complaint {
     Oracle { pixel: UVec2, difference: f64 },
 }
 
+impl PlanTolerance {
+    /// The rule for a plan, given its discrete answer.
+    ///
+    /// Cost: several times that of the discrete answer.
+    ///
+    /// # Errors
+    /// Rays that are too long for any rule.
+    pub fn of(plan: &FramePlan, reference: &Discrete) -> Result<PlanTolerance, Complaint> {
+        let wide = most_difference(plan)?;
+        let (blended, rounding) = (blending(plan, reference), position_rounding(plan));
+        let of_pixel = |bound: f64| reference.ambiguity.iter().zip(&blended).map(move |(a, b)| bound + a + b);
+        let bulk = of_pixel(BULK_BOUND).zip(&rounding).map(|(b, r)| b + r).collect();
+        Ok(PlanTolerance { wide, tolerance: Tolerance { most: of_pixel(wide).collect(), bulk } })
+    }
+
+    /// The rule on devices that filter with weights of so many bits; for the plan and the answer that it was made of.
+    pub fn on(&self, plan: &FramePlan, reference: &Discrete, sub_texel_bits: u32) -> Tolerance {
+        let Mode::Fast { transmittance_floor } = plan.sampling.mode() else { return self.tolerance.clone() };
+        let filter = filter_rounding(plan, sub_texel_bits);
+        let ends = |i: usize| {
+            let transmittance = 1.0 - reference.image.pixels()[i][3];
+            if transmittance <= transmittance_floor + filter[i] + self.wide { transmittance_floor } else { 0.0 }
+        };
+        let fast = |exact: &[f64]| exact.iter().enumerate().map(|(i, e)| e + filter[i] + ends(i)).collect();
+        Tolerance { most: fast(&self.tolerance.most), bulk: fast(&self.tolerance.bulk) }
+    }
+}
+
 impl Tolerance {
     /// The rule for a plan on a device, given the plan's discrete answer.
     ///
     /// # Errors
-    /// Rays that are too long for any rule.
+    /// As [`PlanTolerance::of`].
     pub fn of(plan: &FramePlan, reference: &Discrete, device: &Capabilities) -> Result<Tolerance, Complaint> {
-        let most = most_difference(plan)?;
-        let (blended, rounding) = (blending(plan, reference), position_rounding(plan));
-        let exact =
-            |bound: f64| reference.ambiguity.iter().zip(&blended).map(|(a, b)| bound + a + b).collect::<Vec<f64>>();
-        let narrow = |bulk: Vec<f64>| bulk.iter().zip(&rounding).map(|(b, r)| b + r).collect::<Vec<f64>>();
-        let Mode::Fast { transmittance_floor } = plan.sampling.mode() else {
-            return Ok(Tolerance { most: exact(most), bulk: narrow(exact(BULK_BOUND)) });
-        };
-        let filter = filter_rounding(plan, device.sub_texel_bits);
-        let ends = |i: usize| {
-            let transmittance = 1.0 - reference.image.pixels()[i][3];
-            if transmittance <= transmittance_floor + filter[i] + most { transmittance_floor } else { 0.0 }
-        };
-        let fast = |exact: Vec<f64>| exact.iter().enumerate().map(|(i, e)| e + filter[i] + ends(i)).collect();
-        Ok(Tolerance { most: fast(exact(most)), bulk: fast(narrow(exact(BULK_BOUND))) })
+        Ok(PlanTolerance::of(plan, reference)?.on(plan, reference, device.sub_texel_bits))
     }
 
     /// The bound that a quarter of the pixels exceeds, if it is so wide that hardly anything could fail.

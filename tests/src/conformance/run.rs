@@ -29,12 +29,13 @@ impl Run {
     pub fn case(
         &mut self,
         case: &Case,
+        prepared: &mut Result<Prepared, Obstacle>,
         observe: &mut dyn FnMut(&Outcome),
         keep: &mut dyn FnMut(RecordEntry),
     ) -> Vec<Outcome> {
-        let prepared = match Prepared::of(case) {
+        let prepared = match prepared {
             Ok(prepared) => prepared,
-            Err(obstacle) => return self.not_prepared(case, &obstacle, observe),
+            Err(obstacle) => return self.not_prepared(case, obstacle, observe),
         };
         let mut outcomes = Vec::new();
         let mut images: Vec<Option<Image<f32>>> = Vec::new();
@@ -42,7 +43,7 @@ impl Run {
             let begin = Instant::now();
             let judged = prepared.run(contestant, None);
             judged.answer(&case.name, &contestant.name()).into_iter().for_each(&mut *keep);
-            let (mut outcome, image) = told(case, contestant, judged, &prepared, &self.required, &self.pictures);
+            let (mut outcome, image) = told(case, contestant, judged, prepared, &self.required, &self.pictures);
             outcome.milliseconds = begin.elapsed().as_secs_f64() * 1e3;
             observe(&outcome);
             outcomes.push(outcome);

@@ -11,8 +11,8 @@ use super::contestant::Contestant;
 use super::outcome::{Outcome, Status};
 
 /// Holds cases against their mutants.
-pub struct SelfCheck<'a> {
-    contestants: &'a mut [Contestant],
+#[derive(Default)]
+pub struct SelfCheck {
     patched: BTreeMap<Mutant, Result<Contestant, String>>,
     caught: BTreeSet<Mutant>,
     run: BTreeSet<Mutant>,
@@ -25,27 +25,27 @@ enum Fate {
     NotRun(String),
 }
 
-impl<'a> SelfCheck<'a> {
-    /// With these backends.
-    pub fn new(contestants: &'a mut [Contestant]) -> SelfCheck<'a> {
-        SelfCheck { contestants, patched: BTreeMap::new(), caught: BTreeSet::new(), run: BTreeSet::new() }
-    }
-
-    /// Runs a case against the mutants that it names. It passes if it catches all of those that can be run here, and at
-    /// least one.
-    pub fn case(&mut self, case: &Case) -> Outcome {
+impl SelfCheck {
+    /// Runs a case against the mutants that it names. It passes if it catches all of those that can be run on these backends,
+    /// and at least one.
+    pub fn case(
+        &mut self,
+        case: &Case,
+        prepared: &mut Result<Prepared, Obstacle>,
+        backends: &mut [Contestant],
+    ) -> Outcome {
         let plain = |status, note: String| Outcome::plain(&case.name, "mutants", status, note);
         if case.mutants.is_empty() {
             return plain(Status::Fail, "names no mutant that it must catch".into());
         }
-        let prepared = match Prepared::of(case) {
+        let prepared = match prepared {
             Ok(prepared) => prepared,
             Err(Obstacle::NoData(e)) => return plain(Status::NoData, e.to_string()),
             Err(e) => return plain(Status::Fail, e.to_string()),
         };
         let (mut caught, mut survivors, mut not_run) = (Vec::new(), Vec::new(), Vec::new());
         for mutant in &case.mutants {
-            match self.fate(&prepared, mutant) {
+            match self.fate(prepared, mutant, backends) {
                 Fate::Caught => caught.push(mutant.name()),
                 Fate::Survived(how) => survivors.push(format!("{mutant} ({how})")),
                 Fate::NotRun(why) => not_run.push(format!("{mutant} ({why})")),
@@ -58,10 +58,10 @@ impl<'a> SelfCheck<'a> {
         }
     }
 
-    /// Mutants that no case has caught: one failure each, or no device if it could not be run.
-    pub fn uncaught(&self) -> Vec<Outcome> {
+    /// Mutants that no case has caught: one failure each, or no device if it could not be run on these backends.
+    pub fn uncaught(&self, backends: &[Contestant]) -> Vec<Outcome> {
         let missing = Mutant::all().into_iter().filter(|m| !self.caught.contains(m));
-        let outcome = |m: Mutant| match self.run.contains(&m) || self.can_run(&m) {
+        let outcome = |m: Mutant| match self.run.contains(&m) || backends.iter().any(|b| b.can_run(&m)) {
             true => Outcome::plain(m.name(), "mutants", Status::Fail, "no case has caught it"),
             false => Outcome::plain(m.name(), "mutants", Status::NoDevice, "no backend to run it on"),
         };
@@ -73,17 +73,13 @@ impl<'a> SelfCheck<'a> {
         (self.caught.len(), Mutant::all().len())
     }
 
-    fn can_run(&self, mutant: &Mutant) -> bool {
-        self.contestants.iter().any(|c| c.can_run(mutant))
-    }
-
-    fn fate(&mut self, prepared: &Prepared, mutant: &Mutant) -> Fate {
+    fn fate(&mut self, prepared: &mut Prepared, mutant: &Mutant, backends: &mut [Contestant]) -> Fate {
         let judged = match mutant {
-            Mutant::Plan(_) => match self.contestants.iter_mut().find(|c| c.can_run(mutant)) {
+            Mutant::Plan(_) => match backends.iter_mut().find(|b| b.can_run(mutant)) {
                 Some(contestant) => prepared.run(contestant, Some(mutant)),
                 None => return Fate::NotRun("no backend".into()),
             },
-            Mutant::Shader(_) => match self.patched(mutant) {
+            Mutant::Shader(_) => match self.patched(mutant, backends) {
                 Some(Ok(contestant)) => prepared.run(contestant, Some(mutant)),
                 Some(Err(e)) => return Fate::Survived(e.clone()),
                 None => return Fate::NotRun("no backend with shaders".into()),
@@ -98,9 +94,9 @@ impl<'a> SelfCheck<'a> {
     }
 
     /// A backend that compiles the mutant's shaders, opened once.
-    fn patched(&mut self, mutant: &Mutant) -> Option<&mut Result<Contestant, String>> {
+    fn patched(&mut self, mutant: &Mutant, backends: &[Contestant]) -> Option<&mut Result<Contestant, String>> {
         let Mutant::Shader(shader) = mutant else { return None };
-        let honest = self.contestants.iter().find(|c| c.can_run(mutant))?;
+        let honest = backends.iter().find(|b| b.can_run(mutant))?;
         let open = || match shader.apply() {
             Err(e) => Err(e.to_string()),
             Ok(library) => honest.with_library(library).ok_or_else(|| "cannot be opened with other shaders".to_owned()),

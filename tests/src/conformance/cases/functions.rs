@@ -28,9 +28,9 @@ pub(super) fn cases() -> Vec<Case> {
 fn function(
     name: impl Into<String>,
     mutants: Vec<Mutant>,
-    plan: impl Fn() -> FramePlan + 'static,
+    plan: impl Fn() -> FramePlan + Send + Sync + 'static,
     function: ShaderFunction,
-    points: impl Fn(&FramePlan) -> Vec<Point> + 'static,
+    points: impl Fn(&FramePlan) -> Vec<Point> + Send + Sync + 'static,
 ) -> Case {
     let test = move || {
         let plan = plan();

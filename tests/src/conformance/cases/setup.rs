@@ -136,7 +136,11 @@ impl Setup {
 }
 
 /// A picture case.
-pub(super) fn picture(name: impl Into<String>, mutants: Vec<Mutant>, setup: impl Fn() -> Setup + 'static) -> Case {
+pub(super) fn picture(
+    name: impl Into<String>,
+    mutants: Vec<Mutant>,
+    setup: impl Fn() -> Setup + Send + Sync + 'static,
+) -> Case {
     fallible_picture(name, mutants, move || Ok(setup()))
 }
 
@@ -144,7 +148,7 @@ pub(super) fn picture(name: impl Into<String>, mutants: Vec<Mutant>, setup: impl
 pub(super) fn fallible_picture(
     name: impl Into<String>,
     mutants: Vec<Mutant>,
-    setup: impl Fn() -> Result<Setup, NoData> + 'static,
+    setup: impl Fn() -> Result<Setup, NoData> + Send + Sync + 'static,
 ) -> Case {
     let check = Check::Picture(Box::new(move || Ok(setup()?.build())));
     Case { name: name.into(), check, mutants }
