@@ -1,4 +1,4 @@
-//! The measuring itself: contestants take turns, so that what else the machine does hits them alike.
+//! The measuring itself: contestants take turns, so that other load on the machine hits all of them alike.
 
 use std::time::{Duration, Instant};
 
@@ -12,6 +12,7 @@ use super::rivals::Rivals;
 use super::sweep::{Case, Priority, REACHED};
 use crate::metrics::median;
 use crate::report::{LeftOut, Row};
+use crate::turns::{Spread, order};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug)]
@@ -46,8 +47,8 @@ impl Contest<'_> {
         let bar = progress_bar("measuring");
         bar.set_length((self.cases.len() * self.rivals.present.len()) as u64 * u64::from(1 + self.limits.n_frames));
         let (mut entries, mut left_out) = self.first_round(&bar)?;
-        for _ in 0..self.limits.n_frames {
-            self.round(&mut entries, &mut left_out, &bar);
+        for round in 1..=self.limits.n_frames {
+            self.round(round, &mut entries, &mut left_out, &bar);
         }
         bar.finish_and_clear();
         Ok((entries.into_iter().map(|e| self.row(e)).collect(), left_out))
@@ -112,9 +113,10 @@ impl Contest<'_> {
         Ok(shown.map(|shown| Entry { case, rival, shown, warm_up: timing, timed: Vec::new(), whole }))
     }
 
-    fn round(&mut self, entries: &mut Vec<Entry>, left_out: &mut Vec<LeftOut>, bar: &ProgressBar) {
+    fn round(&mut self, round: u32, entries: &mut Vec<Entry>, left_out: &mut Vec<LeftOut>, bar: &ProgressBar) {
         let mut failed = Vec::new();
-        for (i, entry) in entries.iter_mut().enumerate() {
+        for i in order(round, entries.len()) {
+            let entry = &mut entries[i];
             bar.inc(1);
             if Instant::now() + entry.whole > self.limits.end {
                 continue;
@@ -126,6 +128,7 @@ impl Contest<'_> {
             }
             entry.whole = begin.elapsed();
         }
+        failed.sort();
         for (i, reason) in failed.into_iter().rev() {
             let entry = entries.remove(i);
             left_out.push(self.left_out(entry.case, entry.rival, format!("a later frame failed: {reason}")));
@@ -147,6 +150,7 @@ impl Contest<'_> {
         let (c, d) = (&self.cases[entry.case], self.rivals.present[entry.rival].describe());
         let timings = if entry.timed.is_empty() { vec![entry.warm_up] } else { entry.timed };
         let wall: Vec<f64> = timings.iter().map(|t| t.wall_ms).collect();
+        let spread = Spread::of(&wall);
         let device: Option<Vec<f64>> = timings.iter().map(|t| t.device_ms).collect();
         let Shown { errors, delta_e, files, difference } = entry.shown;
         Row {
@@ -156,10 +160,10 @@ impl Contest<'_> {
             rule: c.rule.name().to_owned(),
             step_voxels: c.step_voxels,
             samples: c.n_samples,
-            min_ms: wall.iter().copied().fold(f64::INFINITY, f64::min),
-            max_ms: wall.iter().copied().fold(0.0, f64::max),
+            min_ms: spread.min,
+            max_ms: spread.max,
             n_frames: wall.len() as u32,
-            median_ms: median(wall),
+            median_ms: spread.median,
             device_ms: device.map(median),
             upload_ms: entry.warm_up.upload_ms,
             rmse: errors.rmse,

@@ -1,12 +1,12 @@
 //! Section 3.1: the paper found subsampling better than averaging on its data. What holds on ours.
 
 use brickfield::bricks::Downsampling;
-use brickfield::frame::Backend;
 use brickfield_core::BrickSide;
 
-use super::measure::{Contestant, answer, distance};
+use super::measure::{answer, distance};
 use super::scenes::{exhibits, geometries, scene, tree, views};
 use super::{LamarArgs, LamarError, Missed, print};
+use crate::turns::Contestant;
 
 pub(super) fn run(args: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
     print("Bricks of 16, ray caster on the cpu, errors against the continuous integral at full resolution.\n")?;
@@ -24,8 +24,8 @@ pub(super) fn run(args: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
             let answer = answer(&exhibit.volume, &scene);
             let mut errors = Vec::new();
             for tree in &trees {
-                let (image, _) = Contestant::new(tree, &scene).frame(&mut cpu as &mut dyn Backend)?;
-                errors.push(distance(&image, &answer)?);
+                let frame = Contestant::new(tree, scene.clone()).frame(&mut cpu)?;
+                errors.push(distance(&frame.image, &answer)?);
             }
             let winner = usize::from(errors[1].rmse < errors[0].rmse);
             n_won[winner] += 1;

@@ -19,11 +19,12 @@ mod shells;
 mod table;
 mod views;
 
-pub use args::{Claim, LamarArgs, Part};
+pub use args::{ClaimKind, LamarArgs, Part};
 pub use error::LamarError;
 
 use crate::compare::rivals::Rivals;
 use crate::compare::say;
+use crate::turns::Claim;
 
 /// What came of the parts that were asked for.
 #[derive(Clone, Debug, Default)]
@@ -36,18 +37,23 @@ pub struct Findings {
 #[derive(Clone, Debug)]
 pub struct Missed {
     /// What it is about.
-    pub claim: Claim,
+    pub kind: ClaimKind,
     /// What does not hold, in words.
     pub what: String,
 }
 
 impl Missed {
     fn of_pictures(what: String) -> Missed {
-        Missed { claim: Claim::Pictures, what }
+        Missed { kind: ClaimKind::Pictures, what }
     }
 
     fn of_times(what: String) -> Missed {
-        Missed { claim: Claim::Times, what }
+        Missed { kind: ClaimKind::Times, what }
+    }
+
+    /// A claim about times, if it is missed.
+    fn of_claim(claim: &Claim) -> Option<Missed> {
+        (!claim.kept).then(|| Missed::of_times(claim.to_string()))
     }
 }
 
