@@ -8,7 +8,7 @@ use std::time::Instant;
 use anyhow::Context;
 use brickfield::{BackendKind, Validation};
 use brickfield_conformance::conformance::{
-    Case, Comparison, Contestant, Outcome, RecordEntry, RecordError, RecordWriter, Run, SelfCheck, Summary, cases,
+    Candidate, Case, Comparison, Outcome, RecordEntry, RecordError, RecordWriter, Run, SelfCheck, Summary, cases,
     for_each_prepared, read_record,
 };
 use clap::Parser;
@@ -29,7 +29,7 @@ struct Options {
     /// Only cases whose name holds this text; may be repeated
     #[arg(long, value_name = "TEXT")]
     case: Vec<String>,
-    /// Run the mutants, too: every case must catch those that it names, every mutant must be caught
+    /// Run the mutants, too: every case must catch the mutants that it names, every mutant must be caught
     #[arg(long)]
     self_check: bool,
     /// Have the driver's validation layer check every call
@@ -41,7 +41,7 @@ struct Options {
     /// Keep all pictures and function values in this file, a record to compare a later run with
     #[arg(long, value_name = "FILE")]
     digests: Option<PathBuf>,
-    /// Compare all pictures and function values with those of an earlier run's record; one that has changed fails the run
+    /// Compare all pictures and function values with an earlier run's record; a changed one fails the run
     #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
     /// Where pictures of failing cases go
@@ -84,7 +84,7 @@ fn main() -> anyhow::Result<ExitCode> {
     Ok(if summary.is_green() && !has_changes { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// What becomes of answers: they are written to a record, compared with an earlier one, or both.
+/// Keeps answers: writes them to a record, compares them with an earlier record, or both.
 struct Keeper {
     writer: Option<RecordWriter>,
     comparison: Option<Comparison>,
@@ -145,39 +145,36 @@ fn list(cases: &[Case]) {
     }
 }
 
-fn contestants(options: &Options) -> Vec<Contestant> {
+fn candidates(options: &Options) -> Vec<Candidate> {
     let validation = if options.validation { Validation::On } else { Validation::Off };
     let kinds = BackendKind::ALL.into_iter().filter(|kind| is_wanted(options, *kind));
-    kinds.flat_map(|kind| Contestant::all(kind, options.adapter.as_deref(), validation)).collect()
+    kinds.flat_map(|kind| Candidate::all(kind, options.adapter.as_deref(), validation)).collect()
 }
 
 /// Runs each case on all backends, and then, if asked for, against its mutants.
 fn run(options: &Options, cases: &[Case], keeper: &mut Keeper) -> Vec<Outcome> {
-    let mut run = Run {
-        contestants: contestants(options),
-        required: options.require.clone(),
-        pictures: options.pictures.clone(),
-    };
+    let mut run =
+        Run { candidates: candidates(options), required: options.require.clone(), pictures: options.pictures.clone() };
     let mut check = options.self_check.then(SelfCheck::default);
     let mut outcomes = Vec::new();
     for_each_prepared(cases, |case, mut prepared| {
         let mut keep = |answer: RecordEntry| keeper.keep(&answer);
         outcomes.extend(run.case(case, &mut prepared, &mut |outcome| println!("{outcome}"), &mut keep));
         if let Some(check) = &mut check {
-            let outcome = check.case(case, &mut prepared, &mut run.contestants);
+            let outcome = check.case(case, &mut prepared, &mut run.candidates);
             println!("{outcome}");
             outcomes.push(outcome);
         }
     });
     if let Some(check) = check {
-        outcomes.extend(uncaught(options, &check, &run.contestants));
+        outcomes.extend(uncaught(options, &check, &run.candidates));
     }
     outcomes
 }
 
 /// Mutants that no case has caught; a part of the cases need not catch all.
-fn uncaught(options: &Options, check: &SelfCheck, backends: &[Contestant]) -> Vec<Outcome> {
-    let uncaught = if options.case.is_empty() { check.uncaught(backends) } else { Vec::new() };
+fn uncaught(options: &Options, check: &SelfCheck, candidates: &[Candidate]) -> Vec<Outcome> {
+    let uncaught = if options.case.is_empty() { check.uncaught(candidates) } else { Vec::new() };
     uncaught.iter().for_each(|outcome| println!("{outcome}"));
     let (n_caught, n) = check.n_caught();
     println!("{n_caught} of {n} mutants caught");

@@ -9,7 +9,7 @@ use indicatif::ProgressBar;
 use super::CompareError;
 use super::output::{OutputError, Pictures, Shown};
 use super::rivals::Rivals;
-use super::sweep::{Case, Priority, REACHED};
+use super::sweep::{Priority, REACHED, SweepPoint};
 use crate::metrics::median;
 use crate::report::{LeftOut, Row};
 use crate::turns::{Spread, order};
@@ -24,15 +24,15 @@ pub(super) struct Limits {
 }
 
 pub(super) struct Contest<'a> {
-    pub(super) cases: &'a [Case],
+    pub(super) points: &'a [SweepPoint],
     pub(super) rivals: &'a mut Rivals,
     pub(super) pictures: &'a Pictures<'a>,
     pub(super) limits: Limits,
 }
 
-/// One backend at one case: its first frame has been drawn and judged.
+/// One backend at one point: its first frame has been drawn and judged.
 struct Entry {
-    case: usize,
+    point: usize,
     rival: usize,
     shown: Shown,
     warm_up: Timing,
@@ -45,7 +45,7 @@ impl Contest<'_> {
     /// A first frame of everybody, which warms up and gives the picture; then timed rounds, until frames or time run out.
     pub(super) fn run(mut self) -> Result<(Vec<Row>, Vec<LeftOut>), CompareError> {
         let bar = progress_bar("measuring");
-        bar.set_length((self.cases.len() * self.rivals.present.len()) as u64 * u64::from(1 + self.limits.n_frames));
+        bar.set_length((self.points.len() * self.rivals.present.len()) as u64 * u64::from(1 + self.limits.n_frames));
         let (mut entries, mut left_out) = self.first_round(&bar)?;
         for round in 1..=self.limits.n_frames {
             self.round(round, &mut entries, &mut left_out, &bar);
@@ -59,25 +59,25 @@ impl Contest<'_> {
         // Half the time is for first frames, so that the other half is for timed ones; what leads may take more.
         let begin = Instant::now();
         let half = begin + self.limits.end.saturating_duration_since(begin) / 2;
-        for case in 0..self.cases.len() {
+        for point in 0..self.points.len() {
             for rival in 0..self.rivals.present.len() {
                 bar.inc(1);
-                if self.is_reached(&entries, case, rival) {
+                if self.is_reached(&entries, point, rival) {
                     continue;
                 }
-                let end = if self.cases[case].priority == Priority::Normal { half } else { self.limits.end };
-                let expected = self.expected(&entries, case, rival);
-                if Instant::now() + expected > end && case > 0 {
+                let end = if self.points[point].priority == Priority::Normal { half } else { self.limits.end };
+                let expected = self.expected(&entries, point, rival);
+                if Instant::now() + expected > end && point > 0 {
                     let reason = match expected {
                         Duration::ZERO => "no time was left for it: allow more --seconds".to_owned(),
                         _ => format!("it would take {:.1} s a frame: allow more --seconds", expected.as_secs_f64()),
                     };
-                    left_out.push(self.left_out(case, rival, reason));
+                    left_out.push(self.left_out(point, rival, reason));
                     continue;
                 }
-                match self.first_frame(case, rival)? {
+                match self.first_frame(point, rival)? {
                     Ok(entry) => entries.push(entry),
-                    Err(reason) => left_out.push(self.left_out(case, rival, reason)),
+                    Err(reason) => left_out.push(self.left_out(point, rival, reason)),
                 }
             }
         }
@@ -85,24 +85,24 @@ impl Contest<'_> {
     }
 
     /// Whether a smaller step is not needed any more: the pursued curve's error is below [`REACHED`].
-    fn is_reached(&self, entries: &[Entry], case: usize, rival: usize) -> bool {
-        let c = &self.cases[case];
-        let reached = |e: &Entry| e.shown.errors.rmse < REACHED && like(&self.cases[e.case], c) && e.rival == rival;
+    fn is_reached(&self, entries: &[Entry], point: usize, rival: usize) -> bool {
+        let c = &self.points[point];
+        let reached = |e: &Entry| e.shown.errors.rmse < REACHED && like(&self.points[e.point], c) && e.rival == rival;
         c.priority == Priority::Pursuit && entries.iter().any(reached)
     }
 
     /// How long a first frame should take, by the same backend's last one of that rule and mode.
-    fn expected(&self, entries: &[Entry], case: usize, rival: usize) -> Duration {
-        let c = &self.cases[case];
-        let last = entries.iter().rev().find(|e| e.rival == rival && like(&self.cases[e.case], c));
+    fn expected(&self, entries: &[Entry], point: usize, rival: usize) -> Duration {
+        let c = &self.points[point];
+        let last = entries.iter().rev().find(|e| e.rival == rival && like(&self.points[e.point], c));
         let Some(last) = last else { return Duration::ZERO };
-        let more = c.n_samples as f64 / self.cases[last.case].n_samples.max(1) as f64;
+        let more = c.n_samples as f64 / self.points[last.point].n_samples.max(1) as f64;
         Duration::from_secs_f64((last.warm_up.wall_ms * more.max(0.0)).min(1e9) * 1e-3)
     }
 
     /// The inner error says why this frame could not be had; the outer one ends the comparison.
-    fn first_frame(&mut self, case: usize, rival: usize) -> Result<Result<Entry, String>, OutputError> {
-        let (begin, c) = (Instant::now(), &self.cases[case]);
+    fn first_frame(&mut self, point: usize, rival: usize) -> Result<Result<Entry, String>, OutputError> {
+        let (begin, c) = (Instant::now(), &self.points[point]);
         let backend = &mut self.rivals.present[rival];
         let Frame { image, timing } = match backend.render(&c.plan) {
             Ok(frame) => frame,
@@ -110,7 +110,7 @@ impl Contest<'_> {
         };
         let whole = begin.elapsed();
         let shown = self.pictures.judge(c, backend.describe(), &image)?;
-        Ok(shown.map(|shown| Entry { case, rival, shown, warm_up: timing, timed: Vec::new(), whole }))
+        Ok(shown.map(|shown| Entry { point, rival, shown, warm_up: timing, timed: Vec::new(), whole }))
     }
 
     fn round(&mut self, round: u32, entries: &mut Vec<Entry>, left_out: &mut Vec<LeftOut>, bar: &ProgressBar) {
@@ -122,7 +122,7 @@ impl Contest<'_> {
                 continue;
             }
             let begin = Instant::now();
-            match self.rivals.present[entry.rival].render(&self.cases[entry.case].plan) {
+            match self.rivals.present[entry.rival].render(&self.points[entry.point].plan) {
                 Ok(frame) => entry.timed.push(frame.timing),
                 Err(e) => failed.push((i, e.to_string())),
             }
@@ -131,12 +131,12 @@ impl Contest<'_> {
         failed.sort();
         for (i, reason) in failed.into_iter().rev() {
             let entry = entries.remove(i);
-            left_out.push(self.left_out(entry.case, entry.rival, format!("a later frame failed: {reason}")));
+            left_out.push(self.left_out(entry.point, entry.rival, format!("a later frame failed: {reason}")));
         }
     }
 
-    fn left_out(&self, case: usize, rival: usize, reason: String) -> LeftOut {
-        let c = &self.cases[case];
+    fn left_out(&self, point: usize, rival: usize, reason: String) -> LeftOut {
+        let c = &self.points[point];
         LeftOut {
             backend: self.rivals.present[rival].describe().backend.to_owned(),
             mode: c.mode.name().to_owned(),
@@ -147,7 +147,7 @@ impl Contest<'_> {
     }
 
     fn row(&self, entry: Entry) -> Row {
-        let (c, d) = (&self.cases[entry.case], self.rivals.present[entry.rival].describe());
+        let (c, d) = (&self.points[entry.point], self.rivals.present[entry.rival].describe());
         let timings = if entry.timed.is_empty() { vec![entry.warm_up] } else { entry.timed };
         let wall: Vec<f64> = timings.iter().map(|t| t.wall_ms).collect();
         let spread = Spread::of(&wall);
@@ -181,7 +181,7 @@ impl Contest<'_> {
     }
 }
 
-/// Whether two cases lie on one curve.
-fn like(a: &Case, b: &Case) -> bool {
+/// Whether two points lie on one curve.
+fn like(a: &SweepPoint, b: &SweepPoint) -> bool {
     a.rule == b.rule && a.mode == b.mode
 }

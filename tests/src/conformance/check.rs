@@ -1,4 +1,4 @@
-//! Runs one case: makes what is asked, and judges what comes back.
+//! Runs one case: prepares its plans and its reference, runs them on a backend, and judges the picture or the values.
 
 use std::any::Any;
 use std::collections::BTreeMap;
@@ -9,8 +9,8 @@ use brickfield::frame::{Capabilities, Mode, RenderError};
 use brickfield_core::Image;
 use brickfield_core::glam::UVec2;
 
-use super::case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, Plans, Shows, Subject};
-use super::contestant::Contestant;
+use super::candidate::Candidate;
+use super::case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, PictureTest, Plans, Shows};
 use super::naive::naive;
 use super::record::RecordEntry;
 use super::rule::{Complaint, PlanTolerance, Tolerance, Verdict, bounded};
@@ -21,17 +21,17 @@ pub struct Prepared {
 }
 
 enum Work {
-    Picture(Box<Picture>),
+    Picture(Box<PreparedPicture>),
     Function(Box<FunctionTest>),
 }
 
 /// A picture case's plans, its reference, and how far a picture may be from it.
-struct Picture {
-    subject: Subject,
+struct PreparedPicture {
+    subject: PictureTest,
     plans: Plans,
     reference: Discrete,
     tolerance: Result<PlanTolerance, Complaint>,
-    /// By [`Picture::device_key`], as backends ask for them.
+    /// By [`PreparedPicture::device_key`], as backends ask for them.
     on_devices: BTreeMap<Option<u32>, Tolerance>,
 }
 
@@ -47,7 +47,7 @@ pub enum Obstacle {
     Wrong(#[from] Complaint),
 }
 
-/// What came of a case on a backend.
+/// The result of a case on a backend.
 pub enum Judged {
     /// The backend is absent.
     Absent,
@@ -57,14 +57,14 @@ pub enum Judged {
     Broken(RenderError),
     /// The backend panicked.
     Panicked(String),
-    /// A picture, and what the rules say.
+    /// A picture, and the verdict of the rules.
     Picture(Image<f32>, Verdict),
     /// A function's outputs, held against its equation: greatest difference in units of its tolerance.
     Function(Vec<[f32; 4]>, Result<f64, String>),
 }
 
 impl Judged {
-    /// What the backend answered, to be kept: a picture, or a function's outputs as a picture of one row.
+    /// The backend's answer, as an entry of a record: a picture, or a function's outputs as a picture of one row.
     pub fn answer(&self, case: &str, backend: &str) -> Option<RecordEntry> {
         let (size, values) = match self {
             Judged::Picture(image, _) => (image.size(), image.pixels()),
@@ -96,7 +96,7 @@ impl Prepared {
                 check_oracle(&subject, &reference)?;
                 let tolerance = PlanTolerance::of(&plans.replayed, &reference);
                 let on_devices = BTreeMap::new();
-                Work::Picture(Box::new(Picture { subject, plans, reference, tolerance, on_devices }))
+                Work::Picture(Box::new(PreparedPicture { subject, plans, reference, tolerance, on_devices }))
             }
         };
         Ok(Prepared { work })
@@ -112,7 +112,7 @@ impl Prepared {
 
     /// Runs the case on a backend; with a mutant, on the plan that the mutant makes of it. (Shader mutants are in the
     /// backend.)
-    pub fn run(&mut self, on: &mut Contestant, mutant: Option<&Mutant>) -> Judged {
+    pub fn run(&mut self, on: &mut Candidate, mutant: Option<&Mutant>) -> Judged {
         let Some(capabilities) = on.capabilities() else { return Judged::Absent };
         let run = AssertUnwindSafe(|| match &mut self.work {
             Work::Function(test) => run_function(test, on, mutant),
@@ -135,14 +135,14 @@ impl Prepared {
     }
 }
 
-/// What a panic said.
+/// The message of a panic.
 fn words(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(|s| (*s).to_owned());
     text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default()
 }
 
 /// A case that shows nothing by accident tests nothing.
-fn check_blank(subject: &Subject, reference: &Discrete) -> Result<(), Complaint> {
+fn check_blank(subject: &PictureTest, reference: &Discrete) -> Result<(), Complaint> {
     let found = match reference.image.pixels().iter().any(|p| p[3] > 1e-6) {
         true => Shows::Something,
         false => Shows::Nothing,
@@ -153,7 +153,7 @@ fn check_blank(subject: &Subject, reference: &Discrete) -> Result<(), Complaint>
     }
 }
 
-fn check_oracle(subject: &Subject, reference: &Discrete) -> Result<(), Complaint> {
+fn check_oracle(subject: &PictureTest, reference: &Discrete) -> Result<(), Complaint> {
     let volume = match &subject.oracle {
         Oracle::Volume(volume) => volume,
         Oracle::EveryLevel(volume) => volume,
@@ -172,7 +172,7 @@ fn check_oracle(subject: &Subject, reference: &Discrete) -> Result<(), Complaint
 }
 
 /// f64, u32 and i32 are handed to backends as f32.
-fn stored_rounding(subject: &Subject) -> f64 {
+fn stored_rounding(subject: &PictureTest) -> f64 {
     use brickfield_core::ScalarType::{F32, F64, I32, U32};
     match subject.tree.scalar_type() {
         F64 | U32 | I32 | F32 => 5e-6,
@@ -180,8 +180,8 @@ fn stored_rounding(subject: &Subject) -> f64 {
     }
 }
 
-impl Picture {
-    /// What a tolerance depends on besides the plan: in fast mode the bits of the device's filter weights.
+impl PreparedPicture {
+    /// The property of a device on which the tolerance depends: in fast mode the bits of its filter weights.
     fn device_key(&self, device: &Capabilities) -> Option<u32> {
         matches!(self.plans.replayed.sampling.mode(), Mode::Fast { .. }).then_some(device.sub_texel_bits)
     }
@@ -196,15 +196,15 @@ impl Picture {
 }
 
 fn run_picture(
-    picture: &mut Picture,
+    picture: &mut PreparedPicture,
     capabilities: &Capabilities,
-    on: &mut Contestant,
+    on: &mut Candidate,
     mutant: Option<&Mutant>,
 ) -> Judged {
     if let Err(complaint) = picture.meet(capabilities) {
         return refused(complaint);
     }
-    let Picture { plans, reference, on_devices, .. } = &*picture;
+    let PreparedPicture { plans, reference, on_devices, .. } = &*picture;
     let tolerance = &on_devices[&picture.device_key(capabilities)];
     let rendered = match mutant {
         Some(Mutant::Plan(mutant)) => on.render(&mutant.apply(&plans.replayed)),
@@ -230,7 +230,7 @@ fn refused(complaint: Complaint) -> Judged {
     Judged::Picture(Image::transparent(UVec2::ZERO), verdict)
 }
 
-fn run_function(test: &FunctionTest, on: &mut Contestant, mutant: Option<&Mutant>) -> Judged {
+fn run_function(test: &FunctionTest, on: &mut Candidate, mutant: Option<&Mutant>) -> Judged {
     let inputs: Vec<[f32; 4]> = test.points.iter().map(|p| p.input).collect();
     let evaluated = match mutant {
         Some(Mutant::Plan(mutant)) => on.evaluate(&mutant.apply(&test.plan), test.function, &inputs),

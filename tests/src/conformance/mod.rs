@@ -8,10 +8,10 @@
 //! - [`RecordWriter`], [`Comparison`]: a record of all answers, and a later run held against it.
 
 mod ahead;
+mod candidate;
 mod case;
 mod cases;
 mod check;
-mod contestant;
 mod naive;
 mod outcome;
 mod pictures;
@@ -25,10 +25,10 @@ pub mod shader_mutants;
 mod surfaces;
 
 pub use ahead::for_each_prepared;
-pub use case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, Plans, Point, Shows, Subject};
+pub use candidate::Candidate;
+pub use case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, PictureTest, Plans, Point, Shows};
 pub use cases::all as cases;
 pub use check::{Judged, Obstacle, Prepared};
-pub use contestant::Contestant;
 pub use outcome::{Outcome, Status, Summary};
 pub use pictures::write_difference;
 pub use plan_mutants::PlanMutant;

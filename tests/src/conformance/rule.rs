@@ -24,12 +24,12 @@ use crate::metrics::{Errors, MetricError, errors, quantile};
 const BULK: f64 = 0.999;
 /// The narrow bound of exact mode.
 const BULK_BOUND: f64 = 1e-5;
-/// What three quarters of a fast picture's pixels must be held to at least.
+/// The widest bound that is a test: three quarters of a fast picture's pixels have a bound that is no wider.
 const EMPTY_PROMISE: f64 = 0.2;
 /// Longer rays have no rule: a plan has at most so many segments.
 const MOST_SAMPLES: u64 = 2 * brickfield::MAX_SEGMENTS as u64;
 
-/// What each pixel may differ by, in every channel; rows from the top.
+/// The bound of each pixel's difference, in every channel; rows from the top.
 #[derive(Clone, Debug)]
 pub struct Tolerance {
     /// No pixel may differ by more.
@@ -47,7 +47,7 @@ pub struct PlanTolerance {
     tolerance: Tolerance,
 }
 
-/// How far a picture was from what was asked, and what the rule says.
+/// How far a picture is from its reference, and the verdict of the rule.
 #[derive(Clone, Debug)]
 pub struct Verdict {
     /// The errors, where the picture could be compared at all.
@@ -152,8 +152,8 @@ impl Tolerance {
     }
 }
 
-/// What holds for every picture, whatever its reference: 0 <= alpha <= 1, and colours within alpha times the transfer
-/// function's greatest, to rounding: that of f32, and of what pixels are blended in.
+/// The law of every picture, whatever its reference: 0 <= alpha <= 1, and colours within alpha times the transfer
+/// function's greatest, to the rounding of f32 and of the format in which pixels are blended.
 pub(crate) fn bounded(image: &Image<f32>, plan: &FramePlan, reference: &Discrete) -> Option<Complaint> {
     let rounding = match plan.proxy.as_ref().map(|proxy| proxy.target()) {
         None | Some(Target::Float32) => 0.0,
@@ -198,7 +198,7 @@ fn most_difference(plan: &FramePlan) -> Result<f64, Complaint> {
     }
 }
 
-/// What blending polygons may change in each pixel; 0 where rays are cast.
+/// How much the blending of polygons may change each pixel; 0 where rays are cast.
 fn blending(plan: &FramePlan, reference: &Discrete) -> Vec<f64> {
     let rounding = match plan.proxy.as_ref().map(|proxy| proxy.target()) {
         None => 0.0,

@@ -5,20 +5,20 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::candidate::Candidate;
 use super::case::{Case, Mutant};
 use super::check::{Judged, Obstacle, Prepared};
-use super::contestant::Contestant;
 use super::outcome::{Outcome, Status};
 
 /// Holds cases against their mutants.
 #[derive(Default)]
 pub struct SelfCheck {
-    patched: BTreeMap<Mutant, Result<Contestant, String>>,
+    patched: BTreeMap<Mutant, Result<Candidate, String>>,
     caught: BTreeSet<Mutant>,
     run: BTreeSet<Mutant>,
 }
 
-/// What became of a mutant in a case.
+/// The fate of a mutant in a case.
 enum Fate {
     Caught,
     Survived(String),
@@ -26,13 +26,13 @@ enum Fate {
 }
 
 impl SelfCheck {
-    /// Runs a case against the mutants that it names. It passes if it catches all of those that can be run on these backends,
-    /// and at least one.
+    /// Runs a case against the mutants that it names. It passes if it catches all mutants that can be run on these
+    /// candidates, and at least one.
     pub fn case(
         &mut self,
         case: &Case,
         prepared: &mut Result<Prepared, Obstacle>,
-        backends: &mut [Contestant],
+        candidates: &mut [Candidate],
     ) -> Outcome {
         let plain = |status, note: String| Outcome::plain(&case.name, "mutants", status, note);
         if case.mutants.is_empty() {
@@ -45,7 +45,7 @@ impl SelfCheck {
         };
         let (mut caught, mut survivors, mut not_run) = (Vec::new(), Vec::new(), Vec::new());
         for mutant in &case.mutants {
-            match self.fate(prepared, mutant, backends) {
+            match self.fate(prepared, mutant, candidates) {
                 Fate::Caught => caught.push(mutant.name()),
                 Fate::Survived(how) => survivors.push(format!("{mutant} ({how})")),
                 Fate::NotRun(why) => not_run.push(format!("{mutant} ({why})")),
@@ -59,9 +59,9 @@ impl SelfCheck {
     }
 
     /// Mutants that no case has caught: one failure each, or no device if it could not be run on these backends.
-    pub fn uncaught(&self, backends: &[Contestant]) -> Vec<Outcome> {
+    pub fn uncaught(&self, candidates: &[Candidate]) -> Vec<Outcome> {
         let missing = Mutant::all().into_iter().filter(|m| !self.caught.contains(m));
-        let outcome = |m: Mutant| match self.run.contains(&m) || backends.iter().any(|b| b.can_run(&m)) {
+        let outcome = |m: Mutant| match self.run.contains(&m) || candidates.iter().any(|c| c.can_run(&m)) {
             true => Outcome::plain(m.name(), "mutants", Status::Fail, "no case has caught it"),
             false => Outcome::plain(m.name(), "mutants", Status::NoDevice, "no backend to run it on"),
         };
@@ -73,14 +73,14 @@ impl SelfCheck {
         (self.caught.len(), Mutant::all().len())
     }
 
-    fn fate(&mut self, prepared: &mut Prepared, mutant: &Mutant, backends: &mut [Contestant]) -> Fate {
+    fn fate(&mut self, prepared: &mut Prepared, mutant: &Mutant, candidates: &mut [Candidate]) -> Fate {
         let judged = match mutant {
-            Mutant::Plan(_) => match backends.iter_mut().find(|b| b.can_run(mutant)) {
-                Some(contestant) => prepared.run(contestant, Some(mutant)),
+            Mutant::Plan(_) => match candidates.iter_mut().find(|c| c.can_run(mutant)) {
+                Some(candidate) => prepared.run(candidate, Some(mutant)),
                 None => return Fate::NotRun("no backend".into()),
             },
-            Mutant::Shader(_) => match self.patched(mutant, backends) {
-                Some(Ok(contestant)) => prepared.run(contestant, Some(mutant)),
+            Mutant::Shader(_) => match self.patched(mutant, candidates) {
+                Some(Ok(candidate)) => prepared.run(candidate, Some(mutant)),
                 Some(Err(e)) => return Fate::Survived(e.clone()),
                 None => return Fate::NotRun("no backend with shaders".into()),
             },
@@ -94,9 +94,9 @@ impl SelfCheck {
     }
 
     /// A backend that compiles the mutant's shaders, opened once.
-    fn patched(&mut self, mutant: &Mutant, backends: &[Contestant]) -> Option<&mut Result<Contestant, String>> {
+    fn patched(&mut self, mutant: &Mutant, candidates: &[Candidate]) -> Option<&mut Result<Candidate, String>> {
         let Mutant::Shader(shader) = mutant else { return None };
-        let honest = backends.iter().find(|b| b.can_run(mutant))?;
+        let honest = candidates.iter().find(|c| c.can_run(mutant))?;
         let open = || match shader.apply() {
             Err(e) => Err(e.to_string()),
             Ok(library) => honest.with_library(library).ok_or_else(|| "cannot be opened with other shaders".to_owned()),

@@ -70,7 +70,7 @@ mutants! {
     /// Segments do not attenuate themselves.
     NO_SELF_ATTENUATION: "no-self-attenuation", "quadrature", "exponential", "vec4f(alpha(d) * optics.rgb, d)"
         => "vec4f(d * optics.rgb, d)";
-    /// Segments are not attenuated by those before.
+    /// Segments are not attenuated by the segments before.
     NO_ATTENUATION: "no-attenuation", "quadrature", "behind", "ray.rgb + exp(-ray.w) * segment.rgb" => "ray.rgb + segment.rgb";
     /// The far Gauss node is not behind the near one.
     GAUSS_UNWEIGHTED: "gauss-unweighted", "quadrature", "gauss2", "near.w + far.w * exp(-0.57735027 * d)" => "near.w + far.w";
@@ -110,7 +110,7 @@ mutants! {
     /// A brick keeps the ray for two segments too many.
     OVERSTAYS: "overstays", "segments", "stop_in", "stop = max(k + 1.0, min(stop, min(walk.end, walk.last)));"
         => "stop = max(k + 1.0, min(stop + 2.0, min(walk.end, walk.last)));";
-    /// A jump over a transparent block goes 24 segments too far: two reach only the dark rim of what follows.
+    /// A jump over a transparent block goes 24 segments too far: two would reach only the dark rim of the next block.
     JUMPS_TOO_FAR: "jumps-too-far", "march", "integrate", "k = block_stop;" => "k = block_stop + 24.0;";
     /// A leap over dark macrocells goes 8 segments too far.
     LEAPS_TOO_FAR: "leaps-too-far", "march", "integrate", "k = end;" => "k = end + 8.0;";
@@ -118,15 +118,15 @@ mutants! {
     LEAPS_TOO_FAR_IN_BRICK: "leaps-too-far-in-brick", "march", "integrate_in", "walk.k = end;" => "walk.k = end + 8.0;";
     /// Of segments with two nodes, the far one may lie anywhere.
     FAR_NODE_FORGOTTEN: "far-node-forgotten", "segments", "stop_in", "stop = select(k, stop, own);" => "";
-    /// Macrocells are taken for those of the next row.
+    /// Macrocells of another row are read.
     MACROCELL_ROW: "macrocell-row", "bricks", "macrocells_at", "at.x + n * (at.y + n * (at.z + n * block.slot))"
         => "at.y + n * (at.x + n * (at.z + n * block.slot))";
-    /// Beams are taken for those of the tiles mirrored at the diagonal.
+    /// The beam of the tile mirrored at the diagonal is read.
     BEAM_MIRRORED: "beam-mirrored", "march", "march", "beams[tile.x + tile.y * n_columns]" => "beams[tile.y + tile.x * n_columns]";
     /// Rays end where their beam has come half its way.
     BEAM_HALVED: "beam-halved", "march", "march", "walk.end = min(walk.end, beam.y);"
         => "walk.end = min(walk.end, 0.5 * (beam.x + beam.y));";
-    /// What earlier passes saw of a ray is forgotten.
+    /// The light of a ray's earlier passes is forgotten.
     PASS_FORGETS: "pass-forgets", "march", "integrate_on", "before = seen_before[slot];" => "before = vec4f(0.0);";
     /// A pass begins at the ray's first segment.
     PASS_RESTARTS: "pass-restarts", "march", "integrate_on", "walk.k = max(walk.k, frame.visible_max.w);" => "";
@@ -152,7 +152,7 @@ mutants! {
     /// Planes parallel to the picture are as far apart on every ray.
     PLANES_NOT_STRETCHED: "planes-not-stretched", "rays", "pixel_ray", "ray.stretch = length;"
         => "ray.stretch = 1.0;";
-    /// Facets are those of the neighbouring square.
+    /// The facet of the neighbouring square is read.
     FACET_BESIDE: "facet-beside", "rays", "facet_of", "return 2u * (square.x + square.y" => "return 2u * (square.x + 1u + square.y";
     /// Rays take the least steep stack of planes.
     STACK_FLAT: "stack-flat", "rays", "stack_of", "let axis = select(select(2u, 1u, steep.y >= steep.z), 0u, steep.x >= steep.y && steep.x >= steep.z);"

@@ -18,7 +18,7 @@ pub struct LamarArgs {
     /// The paper
     #[arg(long, value_enum)]
     pub paper: Paper,
-    /// What is run: all that the paper has (everything but views) unless stated
+    /// Parts to run; all parts of the paper (everything but views) by default
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     pub part: Vec<Part>,
     /// Volume files or folders, in any format that `brickfield render` reads, instead of the three data sets
@@ -79,16 +79,16 @@ pub enum Paper {
     Lamar,
 }
 
-/// What a claim is about.
+/// The subject of a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ClaimKind {
-    /// What pictures and cuts are like: the same on every machine.
+    /// Pictures and cuts: the same on every machine.
     Pictures,
-    /// What is faster.
+    /// Times: which is faster.
     Times,
 }
 
-/// What can be run.
+/// The parts of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Part {
     /// Figures 4 and 5: how many tiles the distance filter selects
@@ -97,7 +97,7 @@ pub enum Part {
     Table,
     /// Section 3.1: subsampling against averaging
     Downsampling,
-    /// Section 3.1: the formula for shared voxels against what is stored
+    /// Section 3.1: the formula for shared voxels against the stored ones
     Memory,
     /// Figure 8 in numbers: a constant field at random cuts, with and without opacity correction
     Seams,

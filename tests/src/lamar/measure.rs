@@ -13,7 +13,7 @@ use crate::conformance::Tolerance;
 use crate::metrics::{delta_e, errors};
 use crate::turns::{Contestant, Ratio, Spread, TimedFrame, take_turns};
 
-/// What a frame draws. Frames of one scene, one of them of level 0 alone, draw the same bricks if these are equal.
+/// The bricks and polygons of a frame. Frames of one scene, one of them of level 0 alone, draw the same bricks if these are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(super) struct Drawn {
     pub(super) n_bricks: usize,
@@ -31,7 +31,7 @@ pub(super) struct Distance {
     pub(super) delta_e_mean: f64,
 }
 
-/// The continuous integral at full resolution: what everything is held against.
+/// The continuous integral at full resolution: the answer to which every picture is held.
 pub(super) fn answer(volume: &Volume, scene: &Scene) -> Image<f64> {
     let options = ContinuousOptions { tolerance: 1e-7, transmittance_floor: 1e-9 };
     let everywhere = Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY };
@@ -46,14 +46,14 @@ pub(super) fn reference(tree: &BrickTree, scene: &Scene) -> Result<Discrete, Lam
 
 /// Two scenes of one tree on one backend, which took turns.
 pub(super) struct Duel {
-    pub(super) first: Outcome,
-    pub(super) second: Outcome,
+    pub(super) first: SceneTimes,
+    pub(super) second: SceneTimes,
     /// The first's time over the second's.
     pub(super) ratio: Ratio,
 }
 
 /// One of two scenes.
-pub(super) struct Outcome {
+pub(super) struct SceneTimes {
     pub(super) image: Image<f32>,
     pub(super) drawn: Drawn,
     /// Whole frames.
@@ -80,13 +80,13 @@ pub(super) fn duel(
         latest[turn.contestant] = Some(frame);
         Ok(frame_ms)
     })?;
-    let outcome = |frame: Option<TimedFrame>, i: usize| {
+    let times = |frame: Option<TimedFrame>, i: usize| {
         let TimedFrame { image, plan, .. } = frame.expect("every contestant has had its turn");
         let (ms, prepare_ms) = (Spread::of(&ms[i]), Spread::of(&prepare_ms[i]));
-        Outcome { image, drawn: Drawn::of(&plan), ms, prepare_ms }
+        SceneTimes { image, drawn: Drawn::of(&plan), ms, prepare_ms }
     };
     let [first, second] = latest;
-    Ok(Duel { first: outcome(first, 0), second: outcome(second, 1), ratio: Ratio::of(&ms[0], &ms[1]) })
+    Ok(Duel { first: times(first, 0), second: times(second, 1), ratio: Ratio::of(&ms[0], &ms[1]) })
 }
 
 impl Drawn {

@@ -7,8 +7,8 @@ use brickfield::lod::Criterion;
 use brickfield_core::{Camera, Image};
 use serde::Serialize;
 
-use super::measure::{Distance, Drawn, Judge, Outcome, answer, distance, duel};
-use super::scenes::{Exhibit, Geometry, exhibits, geometries, geometries_of, scene, sides, tree, views};
+use super::measure::{Distance, Drawn, Judge, SceneTimes, answer, distance, duel};
+use super::scenes::{DataSet, Geometry, data_sets, geometries, geometries_of, scene, sides, tree, views};
 use super::{LamarArgs, LamarError, Missed, print, write_rows};
 use crate::compare::rivals::Rivals;
 use crate::turns::{Bound, Claim, Claims, Ratio, Spread, Standing};
@@ -42,7 +42,7 @@ struct Tiling {
 
 /// One tree seen from one place.
 struct Seat<'a> {
-    exhibit: &'a Exhibit,
+    data_set: &'a DataSet,
     tree: &'a BrickTree,
     camera: Camera,
     view: &'static str,
@@ -60,16 +60,16 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
     ))?;
     print(HEADER)?;
     let mut rows = Vec::new();
-    for exhibit in exhibits(args)? {
-        let exhibit = exhibit?;
-        let views = views(&exhibit, args.size)?;
+    for data_set in data_sets(args)? {
+        let data_set = data_set?;
+        let views = views(&data_set, args.size)?;
         let full = geometries(args)[3];
         let answers =
-            views.map(|(_, camera)| answer(&exhibit.volume, &scene(args, &exhibit.transfer, camera, full, &[])));
+            views.map(|(_, camera)| answer(&data_set.volume, &scene(args, &data_set.transfer, camera, full, &[])));
         for side in sides(args) {
-            let tree = tree(&exhibit.volume, side, Downsampling::Subsample)?;
+            let tree = tree(&data_set.volume, side, Downsampling::Subsample)?;
             for ((view, camera), answer) in views.into_iter().zip(&answers) {
-                let seat = Seat { exhibit: &exhibit, tree: &tree, camera, view, side: side.n_samples(), answer };
+                let seat = Seat { data_set: &data_set, tree: &tree, camera, view, side: side.n_samples(), answer };
                 rows.extend(of_seat(args, rivals, &seat)?);
             }
         }
@@ -88,7 +88,7 @@ RMSE: fixed    multi  max: fixed    multi  as the cut says";
 fn of_seat(args: &LamarArgs, rivals: &mut Rivals, seat: &Seat<'_>) -> Result<Vec<Row>, LamarError> {
     let mut rows = Vec::new();
     for geometry in geometries(args) {
-        let with = |detail: &[Criterion]| scene(args, &seat.exhibit.transfer, seat.camera, geometry, detail);
+        let with = |detail: &[Criterion]| scene(args, &seat.data_set.transfer, seat.camera, geometry, detail);
         let scenes = [with(&[Criterion::FullResolution]), with(&args.detail)];
         let draws = |backend: &dyn Backend| geometries_of(args, backend).any(|own| own == geometry);
         let Some(any) = rivals.present.iter().find(|backend| draws(backend.as_ref())) else { continue };
@@ -112,14 +112,14 @@ fn contest(
     (scenes, judges): (&[Scene; 2], &[Judge; 2]),
 ) -> Result<Row, LamarError> {
     let duel = duel(seat.tree, scenes, backend, args.frames)?;
-    let tiling = |outcome: Outcome, judge: &Judge| -> Result<Tiling, LamarError> {
-        let (error, complaint) = (distance(&outcome.image, seat.answer)?, judge.complaint(&outcome.image));
-        let Outcome { drawn, ms, prepare_ms, .. } = outcome;
+    let tiling = |times: SceneTimes, judge: &Judge| -> Result<Tiling, LamarError> {
+        let (error, complaint) = (distance(&times.image, seat.answer)?, judge.complaint(&times.image));
+        let SceneTimes { drawn, ms, prepare_ms, .. } = times;
         Ok(Tiling { drawn, ms, prepare_ms, error, complaint })
     };
     Ok(Row {
-        data: seat.exhibit.name.clone(),
-        dims: seat.exhibit.volume.grid().dims().to_array(),
+        data: seat.data_set.name.clone(),
+        dims: seat.data_set.volume.grid().dims().to_array(),
         view: seat.view,
         side: seat.side,
         geometry: geometry.name,

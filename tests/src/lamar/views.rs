@@ -1,4 +1,4 @@
-//! A screen-space error of one pixel: what it draws, how long it takes and what it costs, view by view.
+//! A screen-space error of one pixel: bricks, time and error, view by view.
 
 use brickfield::Scene;
 use brickfield::bricks::{BrickTree, Downsampling};
@@ -110,8 +110,8 @@ fn line(row: &Row) -> String {
     )
 }
 
-/// Medians over the views, and the claims that do not hold. What is claimed of times is their median over the views: no row
-/// is decided by itself.
+/// Medians over the views, and the claims that do not hold. The claim about times is about the median over views: no
+/// row is decided by itself.
 fn summary(args: &LamarArgs, rows: &[Row]) -> Result<Vec<Missed>, LamarError> {
     let more = |r: &&Row| r.pixel.0.n_bricks > r.full.0.n_bricks;
     let more = rows

@@ -18,7 +18,7 @@ pub struct Contestant<'a> {
 
 /// A frame and its times in milliseconds.
 pub struct TimedFrame {
-    /// What the backend replayed.
+    /// The plan that the backend replayed.
     pub plan: FramePlan,
     /// The picture.
     pub image: Image<f32>,

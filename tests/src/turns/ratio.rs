@@ -1,4 +1,4 @@
-//! What rounds say: spread of times, and the ratio of two contestants with its confidence interval.
+//! The statistics of rounds: spread of times, and the ratio of two contestants with its confidence interval.
 
 use std::fmt;
 
@@ -69,7 +69,7 @@ impl Ratio {
     /// Of the ratios of rounds, or of other independent ratios.
     ///
     /// # Panics
-    /// If there is none.
+    /// If there is no ratio.
     pub fn of_rounds(mut ratios: Vec<f64>) -> Ratio {
         ratios.sort_unstable_by(f64::total_cmp);
         let n_rounds = ratios.len();

@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 /// A contestant of a server.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Offer {
-    /// What it renders.
+    /// The scene.
     pub what: String,
-    /// On which backend.
+    /// The backend's name.
     pub backend: String,
 }
 

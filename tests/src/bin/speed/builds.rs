@@ -20,7 +20,7 @@ pub(crate) struct BuildRatio {
     ratio: Ratio,
 }
 
-/// Times the contestants that both builds have. What is claimed of a backend is the geometric mean over its contestants, round
+/// Times the contestants that both builds have. The claim about a backend is about the geometric mean over its contestants, round
 /// by round.
 pub(crate) fn against(options: &Options, program: &Path) -> anyhow::Result<Table> {
     let arguments = arguments(options);

@@ -3,8 +3,8 @@
 //! Times are printed, not asserted, unless `--check` is given: then the ratios that the project promises must hold.
 
 mod builds;
-mod exhibits;
 mod promises;
+mod volumes;
 
 use std::fs;
 use std::io;
@@ -19,7 +19,7 @@ use clap::Parser;
 use serde::Serialize;
 
 use builds::BuildRatio;
-use exhibits::{Entrant, Exhibit, Group};
+use volumes::{Entrant, Group, TimedVolume};
 
 /// Times skipping, brick sides, backends, an empty frame and the octree's build, contestants alternating; or two builds
 /// against each other (--other)
@@ -65,7 +65,7 @@ struct Times {
     rounds: Vec<f64>,
 }
 
-/// What came of a run.
+/// The numbers of a run.
 #[derive(Default, Serialize)]
 struct Table {
     times: Vec<Times>,
@@ -102,12 +102,12 @@ fn main() -> anyhow::Result<ExitCode> {
 fn alone(options: &Options) -> anyhow::Result<Table> {
     let mut table = Table::default();
     let mut backends = opened(options, &mut |line| println!("{line}"));
-    for exhibit in exhibits::read(options) {
-        let exhibit = exhibit?;
+    for volume in volumes::read(options) {
+        let volume = volume?;
         for group in [Group::Skipping, Group::Sides] {
-            let times = alternate(options, exhibit.entrants(options, group, &kinds(&backends))?, &mut backends)?;
+            let times = alternate(options, volume.entrants(options, group, &kinds(&backends))?, &mut backends)?;
             if group == Group::Skipping && options.only.is_none() {
-                table.claims.extend(promises::of_skipping(options, &exhibit, &times, &mut backends)?);
+                table.claims.extend(promises::of_skipping(options, &volume, &times, &mut backends)?);
             }
             table.times.extend(times);
         }
@@ -161,11 +161,11 @@ fn alternate(
 /// Renders frames on request. Standard output belongs to the program that asks.
 fn serve_frames(options: &Options) -> anyhow::Result<()> {
     let mut backends = opened(options, &mut |line| eprintln!("{line}"));
-    let exhibits = exhibits::read(options).collect::<anyhow::Result<Vec<Exhibit>>>()?;
+    let volumes = volumes::read(options).collect::<anyhow::Result<Vec<TimedVolume>>>()?;
     let mut entrants = Vec::new();
-    for exhibit in &exhibits {
+    for volume in &volumes {
         for group in [Group::Skipping, Group::Sides] {
-            entrants.extend(exhibit.entrants(options, group, &kinds(&backends))?);
+            entrants.extend(volume.entrants(options, group, &kinds(&backends))?);
         }
     }
     let offers: Vec<_> = entrants.iter().map(|entrant| entrant.offer(&backends)).collect();

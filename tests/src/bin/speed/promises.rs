@@ -11,24 +11,24 @@ use brickfield_conformance::turns::{Bound, Claim, Ratio};
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{BrickSide, Grid, Image, Volume};
 
-use crate::exhibits::{Exhibit, tree};
+use crate::volumes::{TimedVolume, tree};
 use crate::{Backends, Options, Times};
 
 /// Skipping, an empty frame and the pictures of each backend; the CPU path against wgpu.
 pub(crate) fn of_skipping(
     options: &Options,
-    exhibit: &Exhibit,
+    volume: &TimedVolume,
     times: &[Times],
     backends: &mut Backends,
 ) -> anyhow::Result<Vec<Claim>> {
-    let name = exhibit.name;
+    let name = volume.name;
     let rounds = |backend: &str, what: &str| {
         let what = format!("{name}, {what}");
         times.iter().find(|t| t.backend == backend && t.what == what).map(|t| t.rounds.as_slice())
     };
     let plan = |skipping| {
-        let scene = exhibit.scene(options, Mode::FAST, skipping)?;
-        anyhow::Ok(prepare(exhibit.middle(), &scene, &mut Residency::default())?)
+        let scene = volume.scene(options, Mode::FAST, skipping)?;
+        anyhow::Ok(prepare(volume.middle(), &scene, &mut Residency::default())?)
     };
     let (with, without) = (plan(Skipping::On)?, plan(Skipping::Off)?);
     let reference = discrete(&with);
@@ -37,7 +37,7 @@ pub(crate) fn of_skipping(
         let of = |what: &str| rounds(kind.name(), what);
         let pair = (of("fast, no skipping"), of("fast, skipping"));
         let what = format!("{name}, {kind}: without skipping / with, fast mode");
-        claims.push(ratio(what, pair, Bound::AtLeast(exhibit.skipping_gains)));
+        claims.push(ratio(what, pair, Bound::AtLeast(volume.skipping_gains)));
         let empty_ms = of("nothing to see").map_or(f64::NAN, |ms| median(ms.to_vec()));
         let what = format!("{name}, {kind}: 20 ms / a frame with nothing to see");
         claims.push(Claim::of(what, 20.0 / empty_ms.max(1e-3), Bound::AtLeast(1.0)));

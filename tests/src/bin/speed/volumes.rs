@@ -1,4 +1,4 @@
-//! What is rendered: two real volumes, with and without skipping, and in bricks of every side.
+//! The scenes: two real volumes, with and without skipping, and in bricks of every side.
 
 use brickfield::bricks::{BrickTree, BuildOptions, Downsampling, build_tree};
 use brickfield::frame::Mode;
@@ -15,7 +15,7 @@ use crate::{Backends, Options};
 const VOLUMES: [(&str, &str, f64); 2] = [("engine", "ct/engine.vti", 2.0), ("aneurism", "ct/aneurism.vti", 4.0)];
 
 /// A volume and its octrees.
-pub(crate) struct Exhibit {
+pub(crate) struct TimedVolume {
     pub(crate) name: &'static str,
     /// How many times as fast skipping must be in fast mode.
     pub(crate) skipping_gains: f64,
@@ -41,12 +41,12 @@ pub(crate) struct Entrant<'a> {
 }
 
 /// Reads the volumes one by one.
-pub(crate) fn read(options: &Options) -> impl Iterator<Item = anyhow::Result<Exhibit>> {
+pub(crate) fn read(options: &Options) -> impl Iterator<Item = anyhow::Result<TimedVolume>> {
     VOLUMES.into_iter().map(|(name, path, skipping_gains)| {
         let volume = open(&options.data.join(path), &Limits::default())?.volume;
         let trees = BrickSide::ALL.into_iter().map(|side| Ok((side, tree(&volume, side)?)));
         let trees = trees.collect::<anyhow::Result<_>>()?;
-        Ok(Exhibit { name, skipping_gains, volume, trees })
+        Ok(TimedVolume { name, skipping_gains, volume, trees })
     })
 }
 
@@ -54,7 +54,7 @@ pub(crate) fn tree(volume: &Volume, side: BrickSide) -> anyhow::Result<BrickTree
     Ok(build_tree(volume, &BuildOptions { side, downsampling: Downsampling::Average, max_bytes: None })?)
 }
 
-impl Exhibit {
+impl TimedVolume {
     /// The contestants of a group on each of the backends, as far as they are asked for.
     pub(crate) fn entrants(
         &self,
