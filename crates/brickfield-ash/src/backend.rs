@@ -5,19 +5,18 @@ use std::time::Instant;
 
 use brickfield_core::Image as Picture;
 use brickfield_frame::{
-    Backend, Capabilities, Description, Frame, FramePlan, ProxyGeometry, RenderError, ShaderFunction, Target, Timing,
-    check_memory,
+    Backend, Capabilities, Description, Evaluate, Frame, FramePlan, ProxyGeometry, RenderError, Resource,
+    ShaderFunction, Target, Timing, check_memory,
 };
 use brickfield_shaders::{Entry, ShaderLibrary, Variant, passes, pixels_per_pass};
 
-use crate::evaluate::Lists;
-use crate::march::{march, milliseconds_since, read_back, reserve_picture};
+use crate::march::{RenderTime, march, milliseconds_since, read_back, reserve_picture};
 use crate::options::choose;
 use crate::polygons::{Polygons, reserve_canvas};
-use crate::scene::Scene;
+use crate::resources::{Brought, Resources, missing};
 use crate::staging::Staging;
 use crate::variants::Variants;
-use crate::vulkan::{Canvas, Device, Image, Instance, PhysicalDevice, Queue, Resource, Use, physical_devices};
+use crate::vulkan::{Bindable, Canvas, Device, Image, Instance, PhysicalDevice, Queue, Use, physical_devices};
 use crate::{ConnectError, Options, ValidationLog};
 
 /// Replays frame plans through Vulkan, without a window.
@@ -25,9 +24,8 @@ pub struct AshBackend {
     pub(crate) device: Arc<Device>,
     pub(crate) queue: Queue,
     pub(crate) variants: Variants,
-    pub(crate) scene: Scene,
+    pub(crate) resources: Resources,
     pub(crate) staging: Staging,
-    pub(crate) lists: Lists,
     picture: Option<Image>,
     canvas: Option<Canvas>,
     polygons: Polygons,
@@ -49,9 +47,8 @@ impl AshBackend {
         Ok(AshBackend {
             queue: Queue::new(&device)?,
             variants: Variants::new(ShaderLibrary::embedded()),
-            scene: Scene::new(&device)?,
+            resources: Resources::new(&device)?,
             staging: Staging::new(&device, options.copy_bytes),
-            lists: Lists::new(),
             picture: None,
             canvas: None,
             polygons: Polygons::new(),
@@ -80,27 +77,24 @@ impl AshBackend {
     fn replay(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
         let started = Instant::now();
         let pipeline = self.variants.pipeline(&self.device, Variant::of(plan, Entry::March))?;
-        let uniforms = self.scene.upload(&mut self.queue, &mut self.staging, plan, pipeline)?;
+        let Brought { uniforms, n_bytes } = self.resources.bring(&mut self.queue, &mut self.staging, plan, pipeline)?;
         let picture = reserve_picture(&mut self.picture, &self.device, plan.size())?;
         let group_height = pipeline.workgroup_size()[1];
-        if pipeline.binds(8) {
-            self.scene.reserve_rays(pixels_per_pass(plan, group_height))?;
+        if pipeline.uses(Resource::SeenBefore) {
+            self.resources.reserve_rays(pixels_per_pass(plan, group_height))?;
         }
-        let scene = &self.scene;
-        let bound = pipeline.bind(|binding| match binding {
-            5 => Some(Resource::Picture(picture)),
-            _ => scene.resource(binding),
+        let resources = &self.resources;
+        let bound = pipeline.bind(|binding| match binding.resource {
+            Resource::Picture => Some(Bindable::Picture(picture)),
+            _ => resources.bindable(binding),
         })?;
         let upload_ms = milliseconds_since(started);
-        let target = scene.uniforms().expect("the upload filled it");
+        let target = resources.buffer(Resource::Frame).ok_or_else(|| missing(Resource::Frame))?;
         let time = march(&mut self.queue, &bound, picture, (target, uniforms), &passes(plan, group_height))?;
         let marched = Instant::now();
         let image = read_back(&mut self.queue, &mut self.staging, picture, (Target::Float32, Use::ShaderWrite))?;
         let read_back_ms = milliseconds_since(marched);
-        Ok(Frame {
-            image,
-            timing: Timing { upload_ms, device_ms: time.device_ms, wall_ms: time.wall_ms, read_back_ms },
-        })
+        Ok(Frame::new(image, timing(upload_ms, &time, read_back_ms)).with_upload(n_bytes))
     }
 
     /// As [`replay`](Self::replay), by rasterising polygons.
@@ -109,18 +103,24 @@ impl AshBackend {
         let canvas = reserve_canvas(&mut self.canvas, &self.device, target, plan.size())?;
         let variant = Variant::of(plan, Entry::Proxy);
         let pipeline = self.variants.blending_into(&self.device, variant, target)?;
-        self.scene.upload(&mut self.queue, &mut self.staging, plan, pipeline)?;
-        self.polygons.hold(&self.device, &mut self.queue, &mut self.staging, proxy)?;
-        let scene = &self.scene;
-        let bound = pipeline.bind(|binding| scene.resource(binding))?;
+        let brought = self.resources.bring(&mut self.queue, &mut self.staging, plan, pipeline)?;
+        let of_polygons = self.polygons.bring(&self.device, &mut self.queue, &mut self.staging, proxy)?;
+        let resources = &self.resources;
+        let bound = pipeline.bind(|binding| resources.bindable(binding))?;
         let upload_ms = milliseconds_since(started);
         let time = self.polygons.draw(&mut self.queue, &bound, canvas, proxy)?;
         let drawn = Instant::now();
         let image = read_back(&mut self.queue, &mut self.staging, &canvas.image, (target, Use::Canvas))?;
         let read_back_ms = milliseconds_since(drawn);
-        let timing = Timing { upload_ms, device_ms: time.device_ms, wall_ms: time.wall_ms, read_back_ms };
-        Ok(Frame { image, timing })
+        let frame = Frame::new(image, timing(upload_ms, &time, read_back_ms));
+        Ok(frame.with_upload(brought.n_bytes + of_polygons))
     }
+}
+
+fn timing(upload_ms: f64, time: &RenderTime, read_back_ms: f64) -> Timing {
+    let mut timing = Timing::of_rendering(time.wall_ms);
+    (timing.upload_ms, timing.device_ms, timing.read_back_ms) = (upload_ms, time.device_ms, read_back_ms);
+    timing
 }
 
 impl Backend for AshBackend {
@@ -138,15 +138,21 @@ impl Backend for AshBackend {
             return Err(RenderError::ImageTooLarge { size, limit });
         }
         check_memory(size)?;
-        if plan.visible.is_empty() || plan.domain.is_empty() || size.min_element() == 0 {
-            return Ok(Frame { image: Picture::transparent(size), timing: Timing::default() });
+        if plan.shows_nothing() {
+            return Ok(Frame::new(Picture::transparent(size), Timing::default()));
         }
-        match &plan.proxy {
+        match plan.proxy() {
             Some(proxy) => self.rasterise(plan, proxy),
             None => self.replay(plan),
         }
     }
 
+    fn as_evaluate(&mut self) -> Option<&mut dyn Evaluate> {
+        Some(self)
+    }
+}
+
+impl Evaluate for AshBackend {
     fn evaluate(
         &mut self,
         plan: &FramePlan,
@@ -162,15 +168,11 @@ impl Backend for AshBackend {
 
 fn describe(device: &PhysicalDevice) -> Description {
     let limits = &device.limits;
-    Description {
-        backend: "ash",
-        adapter: device.summary.name.clone(),
-        driver: device.summary.driver.clone(),
-        capabilities: Capabilities {
-            max_texture_3d: limits.max_image_dimension3_d,
-            max_image: limits.max_image_dimension2_d,
-            max_buffer_bytes: u64::from(limits.max_storage_buffer_range),
-            sub_texel_bits: limits.sub_texel_precision_bits,
-        },
-    }
+    let mut capabilities = Capabilities::UNLIMITED;
+    capabilities.max_texture_3d = limits.max_image_dimension3_d;
+    capabilities.max_image = limits.max_image_dimension2_d;
+    capabilities.max_buffer_bytes = u64::from(limits.max_storage_buffer_range);
+    capabilities.max_storage_buffers = limits.max_per_stage_descriptor_storage_buffers;
+    capabilities.sub_texel_bits = limits.sub_texel_precision_bits;
+    Description::new("ash", device.summary.name.clone(), device.summary.driver.clone(), capabilities)
 }

@@ -1,14 +1,14 @@
 #![doc = include_str!("../README.md")]
 
-mod atlas;
 mod backend;
 mod error;
 mod evaluate;
 mod march;
 mod options;
 mod polygons;
-mod scene;
+mod resources;
 mod staging;
+mod texture;
 mod variants;
 mod vulkan;
 

@@ -5,51 +5,54 @@ use std::time::Instant;
 
 use ash::vk;
 use brickfield_core::glam::UVec2;
-use brickfield_frame::{Held, ProxyGeometry, RenderError, Target};
+use brickfield_frame::{ContentId, ProxyGeometry, RenderError, Target};
 
 use crate::march::{RenderTime, milliseconds_since};
-use crate::scene::Slot;
-use crate::staging::Staging;
+use crate::resources::Reused;
+use crate::staging::{Staging, Write};
 use crate::vulkan::{BoundPipeline, Canvas, Device, Queue, Triangles, Use};
 
 /// The polygons on the device.
 pub(crate) struct Polygons {
-    held: Held<ProxyGeometry>,
-    corners: Slot,
-    indices: Slot,
+    held: Option<ContentId>,
+    corners: Reused,
+    indices: Reused,
 }
 
 impl Polygons {
     /// None yet.
     pub(crate) fn new() -> Polygons {
         Polygons {
-            held: Held::nothing(),
-            corners: Slot::new("the polygons' corners", vk::BufferUsageFlags::VERTEX_BUFFER),
-            indices: Slot::new("the polygons' triangles", vk::BufferUsageFlags::INDEX_BUFFER),
+            held: None,
+            corners: Reused::new("the polygons' corners", vk::BufferUsageFlags::VERTEX_BUFFER),
+            indices: Reused::new("the polygons' triangles", vk::BufferUsageFlags::INDEX_BUFFER),
         }
     }
 
-    /// Brings polygons to the device, if they are not there.
-    pub(crate) fn hold(
+    /// Brings polygons to the device, if they are not there; the bytes that were brought.
+    pub(crate) fn bring(
         &mut self,
         device: &Arc<Device>,
         queue: &mut Queue,
         staging: &mut Staging,
-        proxy: &Arc<ProxyGeometry>,
-    ) -> Result<(), RenderError> {
-        if !self.held.is(proxy) {
-            self.held = Held::nothing();
-            let n_corners = proxy.corners().len();
-            if proxy.indices().iter().any(|i| *i as usize >= n_corners) {
-                return Err(RenderError::Unsupported { what: "draw triangles without corners" });
-            }
-            let (corners, indices) = (bytemuck::cast_slice(proxy.corners()), bytemuck::cast_slice(proxy.indices()));
-            let to_corners = self.corners.reserve(device, corners.len())?;
-            let to_indices = self.indices.reserve(device, indices.len())?;
-            staging.fill(queue, &[(to_corners, corners), (to_indices, indices)])?;
-            self.held = Held::of(proxy);
+        proxy: &ProxyGeometry,
+    ) -> Result<u64, RenderError> {
+        if self.held == Some(proxy.id()) {
+            return Ok(0);
         }
-        Ok(())
+        self.held = None;
+        let n_corners = proxy.corners().len();
+        if proxy.indices().iter().any(|i| *i as usize >= n_corners) {
+            return Err(RenderError::Unsupported { what: "draw triangles without corners" });
+        }
+        let (corners, indices) = (bytemuck::cast_slice(proxy.corners()), bytemuck::cast_slice(proxy.indices()));
+        let writes = [
+            Write { target: self.corners.reserve(device, corners.len())?, offset: 0, bytes: corners },
+            Write { target: self.indices.reserve(device, indices.len())?, offset: 0, bytes: indices },
+        ];
+        staging.fill(queue, &writes)?;
+        self.held = Some(proxy.id());
+        Ok((corners.len() + indices.len()) as u64)
     }
 
     /// Clears a canvas and draws the polygons into it, batch by batch.

@@ -14,6 +14,14 @@ pub(crate) struct Staging {
     read_back: Option<HostBuffer>,
 }
 
+/// New content for a part of a buffer on the device.
+#[derive(Clone, Copy)]
+pub(crate) struct Write<'a> {
+    pub(crate) target: &'a Buffer,
+    pub(crate) offset: u64,
+    pub(crate) bytes: &'a [u8],
+}
+
 /// A part of a buffer's new content, and where it lies on the way.
 struct Piece<'a> {
     target: &'a Buffer,
@@ -48,18 +56,19 @@ impl Staging {
         self.upload.take_if(|b| b.buffer().n_bytes() > (self.chunk_bytes / 16) as u64);
     }
 
-    /// Fills buffers on the device from their start, for shaders to read.
-    pub(crate) fn fill(&mut self, queue: &mut Queue, contents: &[(&Buffer, &[u8])]) -> Result<(), RenderError> {
-        for batch in batches(contents, self.chunk_bytes) {
+    /// Fills parts of buffers on the device, for shaders to read.
+    pub(crate) fn fill(&mut self, queue: &mut Queue, writes: &[Write<'_>]) -> Result<(), RenderError> {
+        for batch in batches(writes, self.chunk_bytes) {
             let staging = self.upload(batch.iter().map(|p| p.bytes.len()).sum())?;
             for piece in &batch {
                 staging.write(piece.staging_offset, piece.bytes);
             }
             let from = staging.buffer();
             queue.run("uploading a frame's data", |recorder| {
-                for piece in &batch {
-                    let (from, to) = ((from, piece.staging_offset as u64), (piece.target, piece.target_offset));
-                    recorder.copy(from, to, piece.bytes.len() as u64);
+                for run in batch.chunk_by(Piece::is_followed_by) {
+                    let n_bytes: usize = run.iter().map(|piece| piece.bytes.len()).sum();
+                    let (from, to) = ((from, run[0].staging_offset as u64), (run[0].target, run[0].target_offset));
+                    recorder.copy(from, to, n_bytes as u64);
                 }
                 recorder.barrier(Use::CopyTarget, Use::ShaderRead);
             })?;
@@ -93,17 +102,28 @@ fn reserve<'a>(
     }
 }
 
+impl Piece<'_> {
+    /// Whether another piece lies right behind this one, on both sides: one copy is enough for both.
+    fn is_followed_by(&self, other: &Piece<'_>) -> bool {
+        let n_bytes = self.bytes.len();
+        std::ptr::eq(self.target, other.target)
+            && self.target_offset + n_bytes as u64 == other.target_offset
+            && self.staging_offset + n_bytes == other.staging_offset
+    }
+}
+
 /// Cuts contents into batches of at most `capacity` bytes.
-fn batches<'a>(contents: &[(&'a Buffer, &'a [u8])], capacity: usize) -> Vec<Vec<Piece<'a>>> {
+fn batches<'a>(writes: &[Write<'a>], capacity: usize) -> Vec<Vec<Piece<'a>>> {
     let mut batches: Vec<Vec<Piece<'a>>> = Vec::new();
     let mut used = capacity;
-    for &(target, content) in contents {
-        for (i, bytes) in content.chunks(capacity).enumerate() {
+    for &Write { target, offset, bytes } in writes {
+        for (i, bytes) in bytes.chunks(capacity).enumerate() {
             if used + bytes.len() > capacity {
                 batches.push(Vec::new());
                 used = 0;
             }
-            let piece = Piece { target, target_offset: (i * capacity) as u64, staging_offset: used, bytes };
+            let target_offset = offset + (i * capacity) as u64;
+            let piece = Piece { target, target_offset, staging_offset: used, bytes };
             used += bytes.len();
             match batches.last_mut() {
                 Some(batch) => batch.push(piece),

@@ -37,8 +37,8 @@ impl Variants {
         match self.pipelines.entry((variant, target)) {
             Occupied(known) => Ok(known.into_mut()),
             Vacant(new) => {
-                let shader = self.library.specialise(&variant);
-                let shader = shader.map_err(|e| RenderError::Shader { message: e.to_string() })?;
+                let limit = device.physical().limits.max_per_stage_descriptor_storage_buffers;
+                let shader = self.library.specialise_within(&variant, limit)?;
                 Ok(new.insert(Pipeline::new(device, &shader, target)?))
             }
         }

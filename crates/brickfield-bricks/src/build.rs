@@ -9,7 +9,7 @@ use crate::bins::{BinTable, Histogram};
 use crate::downsample::{Dense, downsample};
 use crate::fill::{copy_brick, owned_histogram, range_of};
 use crate::sample::Sample;
-use crate::tree::TreeLevel;
+use crate::tree::{TreeId, TreeLevel};
 use crate::{Bins, BrickSummary, BrickTree, Downsampling, tree_memory};
 
 /// How to build a tree.
@@ -78,7 +78,8 @@ pub fn build_tree_observed(
     let job = Job { layout, downsampling: options.downsampling, bins, brick_done: &brick_done };
     let levels = with_voxels!(volume.voxels(), v => build_levels(v, &job))?;
     let (grid, scalar) = (*volume.grid(), volume.scalar_type());
-    Ok(BrickTree { layout, grid, downsampling: options.downsampling, bins, scalar, levels })
+    let id = TreeId::new();
+    Ok(BrickTree { id, layout, grid, downsampling: options.downsampling, bins, scalar, levels })
 }
 
 /// What all levels are built with.

@@ -14,4 +14,4 @@ pub use build::{BuildError, BuildOptions, Progress, build_tree, build_tree_obser
 pub use downsample::Downsampling;
 pub use memory::{LevelMemory, TreeMemory, tree_memory};
 pub use sample::BrickSamples;
-pub use tree::{BrickSummary, BrickTree};
+pub use tree::{BrickSummary, BrickTree, TreeId};

@@ -1,5 +1,7 @@
 //! The octree of bricks with its data.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use brickfield_core::{BrickId, BrickLayout, Grid, Level, ScalarType, ValueRange, Voxels, with_voxels};
 
 use crate::sample::Sample;
@@ -8,9 +10,10 @@ use crate::{Bins, BrickSamples, Downsampling, Histogram, TreeMemory, tree_memory
 /// A volume as an octree of bricks (LaMar, Hamann and Joy 1999, section 3).
 ///
 /// Every brick holds side^3 samples of the volume's scalar type; neighbours share their border samples, bit by bit.
-/// Made by [`build_tree`](crate::build_tree).
-#[derive(Clone, Debug, PartialEq)]
+/// Made by [`build_tree`](crate::build_tree). It does not change afterwards; a clone is the same tree.
+#[derive(Clone, Debug)]
 pub struct BrickTree {
+    pub(crate) id: TreeId,
     pub(crate) layout: BrickLayout,
     pub(crate) grid: Grid,
     pub(crate) downsampling: Downsampling,
@@ -19,7 +22,27 @@ pub struct BrickTree {
     pub(crate) levels: Vec<TreeLevel>,
 }
 
-/// What is known of a brick without its samples.
+/// The identity of a tree: equal samples elsewhere are another tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct TreeId(u64);
+
+impl TreeId {
+    /// An identity that no other tree of this process has.
+    pub(crate) fn new() -> TreeId {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        TreeId(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
+}
+
+/// Trees are equal if their samples are.
+impl PartialEq for BrickTree {
+    fn eq(&self, other: &BrickTree) -> bool {
+        let of = |t: &BrickTree| (t.layout, t.grid, t.downsampling, t.bins, t.scalar);
+        self.id == other.id || (of(self) == of(other) && self.levels == other.levels)
+    }
+}
+
+/// The range and histogram of a brick, known without its samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrickSummary {
     /// Least and greatest value that the brick stands for: its own samples, shared borders included, and those of all
@@ -37,6 +60,11 @@ pub(crate) struct TreeLevel {
 }
 
 impl BrickTree {
+    /// Its identity: time steps of one layout have several.
+    pub fn id(&self) -> TreeId {
+        self.id
+    }
+
     /// Which bricks there are, and where.
     pub fn layout(&self) -> &BrickLayout {
         &self.layout

@@ -1,7 +1,7 @@
 //! The blocks that a ray crosses, one after the other.
 
 use brickfield_core::Span;
-use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::glam::UVec3;
 use brickfield_frame::{FramePlan, IndexEntry, PlanRay};
 
 /// A ray's way through a block.
@@ -19,7 +19,6 @@ pub(crate) struct Crossing {
 pub(crate) struct Blocks<'a> {
     plan: &'a FramePlan,
     ray: &'a PlanRay,
-    n_cells: f64,
     cell: UVec3,
     t: f64,
     end: f64,
@@ -28,36 +27,35 @@ pub(crate) struct Blocks<'a> {
 impl<'a> Blocks<'a> {
     /// The blocks of a span in the domain.
     pub(crate) fn new(plan: &'a FramePlan, ray: &'a PlanRay, span: Span) -> Blocks<'a> {
-        let n_cells = f64::from(plan.bricks.side().n_cells());
-        let mut blocks = Blocks { plan, ray, n_cells, cell: UVec3::ZERO, t: span.start, end: span.end };
+        let mut blocks = Blocks { plan, ray, cell: UVec3::ZERO, t: span.start, end: span.end };
         blocks.cell = blocks.cell_at(span.start);
         blocks
     }
 
     /// The index cell of the ray's position at `t`.
     fn cell_at(&self, t: f64) -> UVec3 {
-        let q = (self.plan.rays.center + self.ray.at(t)).clamp(DVec3::ZERO, self.plan.last_sample());
-        (q / self.n_cells).as_uvec3().min(self.plan.index.dims() - 1)
+        self.plan.field().cell_at(self.plan.rays().center + self.ray.at(t))
     }
 
     /// The cells of a block: from the first, to the one behind the last.
     fn cells(&self, entry: IndexEntry) -> (UVec3, UVec3) {
-        let level = u32::from(entry.level().0);
-        let low = self.cell >> level << level;
-        (low, (low + entry.level().stride()).min(self.plan.index.dims()))
+        let (low, high) = entry.reach().block(self.cell);
+        (low, high.min(self.plan.field().index().dims()))
     }
 
     /// Where the ray leaves some cells, along which axis; beyond the index there is nothing to leave to.
     fn exit(&self, low: UVec3, high: UVec3) -> (f64, Option<usize>) {
-        let ray = self.ray;
+        let (ray, index) = (self.ray, self.plan.field().index());
+        let lattice = index.lattice();
         let mut exit = (f64::INFINITY, None);
         for axis in 0..3 {
             let d = ray.direction[axis];
             let face = if d > 0.0 { high[axis] } else { low[axis] };
-            if d == 0.0 || face == 0 || face == self.plan.index.dims()[axis] {
+            if d == 0.0 || face == 0 || face == index.dims()[axis] {
                 continue;
             }
-            let face = f64::from(face) * self.n_cells - self.plan.rays.center[axis];
+            let face =
+                f64::from(face) * f64::from(lattice.cell_samples) + lattice.origin - self.plan.rays().center[axis];
             let t = (face - ray.anchor[axis]) / d + ray.t_anchor;
             if t < exit.0 {
                 exit = (t, Some(axis));
@@ -78,7 +76,7 @@ impl Iterator for Blocks<'_> {
 
     fn next(&mut self) -> Option<Crossing> {
         while self.t < self.end {
-            let (cell, entry, start) = (self.cell, self.plan.index.at(self.cell), self.t);
+            let (cell, entry, start) = (self.cell, self.plan.field().index().at(self.cell), self.t);
             let (low, high) = self.cells(entry);
             let (exit, axis) = self.exit(low, high);
             self.t = exit.clamp(start, self.end);

@@ -6,7 +6,8 @@ mod support;
 use brickfield_core::glam::{DVec2, DVec3, UVec2, UVec3};
 use brickfield_core::{BrickLayout, BrickSide, Camera, IndexPos, Level, Projection, ScalarType, TransferFunction};
 use brickfield_frame::{
-    Division, FramePlan, IndexEntry, Lengths, Placement, PlanRay, ProxyCorner, ProxyGeometry, Target,
+    Division, Drawing, FramePlan, IndexEntry, Lengths, Placement, PlanParts, PlanRay, ProxyCorner, ProxyGeometry,
+    Target,
 };
 use proptest::prelude::*;
 use support::Setup;
@@ -40,38 +41,38 @@ fn fragments(proxy: &ProxyGeometry, at: DVec2) -> Vec<Fragment> {
 
 /// The ray of a pixel, beside its place by shares of what f32 may do.
 fn ray_beside(plan: &FramePlan, (x, y): (u32, u32), beside: [f64; 3]) -> PlanRay {
-    let ray = plan.rays.ray(x, y);
-    let far = plan.domain.diagonal() / ray.direction.length();
-    PlanRay { anchor: ray.anchor + DVec3::from(beside) * plan.rays.rounding(x, y, &ray, far), ..ray }
+    let ray = plan.rays().ray(x, y);
+    let far = plan.domain().diagonal() / ray.direction.length();
+    PlanRay { anchor: ray.anchor + DVec3::from(beside) * plan.rays().rounding(x, y, &ray, far), ..ray }
 }
 
 /// The far ends of a ray's segments in the bricks, from back to front: brick, and surface.
 fn expected(plan: &FramePlan, cells: &[UVec3], ray: &PlanRay) -> Vec<(u32, f32, f64)> {
-    let n = f64::from(plan.bricks.side().n_cells());
+    let (index, domain, lengths) = (plan.field().index(), plan.domain(), plan.sampling().lengths());
+    let n = f64::from(index.lattice().cell_samples);
     let mut ends = Vec::new();
     for (brick, cell) in cells.iter().enumerate() {
-        let level = u32::from(plan.index.at(*cell).level().0);
-        let low = *cell >> level << level;
-        let high = low + (1 << level);
+        let reach = index.at(*cell).reach();
+        let (low, high) = reach.block(*cell);
         let (mut start, mut end) = (ray.t_eye, f64::INFINITY);
         for axis in 0..3 {
-            let first = if low[axis] == 0 { plan.domain.min[axis] } else { f64::from(low[axis]) * n };
-            let last =
-                if high[axis] >= plan.index.dims()[axis] { plan.domain.max[axis] } else { f64::from(high[axis]) * n };
+            let face_of = |cell: u32| f64::from(cell) * n;
+            let first = if low[axis] == 0 { domain.min[axis] } else { face_of(low[axis]) };
+            let last = if high[axis] >= index.dims()[axis] { domain.max[axis] } else { face_of(high[axis]) };
             let at =
-                |face: f64| (face - plan.rays.center[axis] - ray.anchor[axis]) / ray.direction[axis] + ray.t_anchor;
+                |face: f64| (face - plan.rays().center[axis] - ray.anchor[axis]) / ray.direction[axis] + ray.t_anchor;
             start = start.max(at(first).min(at(last)));
             end = end.min(at(first).max(at(last)));
         }
-        let step = plan.sampling.step_world() * ray.stretch * f64::from(1 << level);
+        let step = plan.sampling().step_world() * ray.stretch * f64::from(reach.level_of_brick().stride());
         // Nothing that a rounding could take away.
         if end - start < 1e-6 {
             continue;
         }
-        if plan.sampling.lengths() == Lengths::True {
+        if lengths == Lengths::True {
             ends.push((brick as u32, ProxyCorner::EXIT, end));
         }
-        let shift = if plan.sampling.lengths() == Lengths::True { 0.0 } else { 0.5 };
+        let shift = if lengths == Lengths::True { 0.0 } else { 0.5 };
         for k in (start / step - shift).ceil() as i64..=(end / step - shift).floor() as i64 {
             let t = (k as f64 + shift) * step;
             if t > start + 1e-6 && t < end - 1e-6 {
@@ -114,7 +115,7 @@ proptest! {
         let level = |cell: UVec3| ((cell.x * 7 + cell.y * 13 + cell.z * 29 + seed) % 3) as u8;
         let placements =
             [Placement::TessellatedShells { facet_pixels: 5 }, Placement::ViewportPlanes, Placement::ObjectPlanes];
-        let plan = Setup {
+        let setup = Setup {
             camera,
             step_world,
             level: &level,
@@ -124,26 +125,28 @@ proptest! {
             division: Division::Brick,
             lengths: if nominal { Lengths::Nominal } else { Lengths::True },
             ..Setup::new(&volume, TransferFunction::constant(0.1, [1.0; 3]).unwrap())
-        }
-        .plan();
-        let layout = BrickLayout::new(volume.grid().dims(), side);
-        let is_first = |cell: &UVec3| match plan.index.at(*cell) {
-            IndexEntry::Resident { level, .. } => *cell >> u32::from(level.0) << u32::from(level.0) == *cell,
-            IndexEntry::Transparent { .. } => false,
         };
+        let parts = setup.parts();
+        let is_first = |cell: &UVec3| match parts.field.index().at(*cell) {
+            IndexEntry::Resident { reach, .. } => reach.block(*cell).0 == *cell,
+            IndexEntry::Empty { .. } => false,
+        };
+        let layout = BrickLayout::new(volume.grid().dims(), side);
         let cells: Vec<UVec3> = layout.bricks(Level(0)).map(|id| id.coords).filter(is_first).collect();
-        let proxy = ProxyGeometry::of(&plan, &cells, Target::Float32);
+        let drawing = Drawing::Polygons { back_to_front: cells.clone(), target: Target::Float32 };
+        let plan = FramePlan::new(PlanParts { drawing, ..parts }).unwrap();
+        let proxy = plan.proxy().unwrap();
         for (x, y) in (0..13).flat_map(|y| (0..17).map(move |x| (x, y))) {
-            let found = fragments(&proxy, DVec2::new(f64::from(x), f64::from(y)) + 0.5);
+            let found = fragments(proxy, DVec2::new(f64::from(x), f64::from(y)) + 0.5);
             let mut last = vec![None; cells.len()];
             for (brick, surface, _) in expected(&plan, &cells, &ray_beside(&plan, (x, y), beside)) {
                 let own = |f: &Fragment| {
-                    let owner = match plan.rays.placement {
+                    let owner = match plan.rays().placement {
                         _ if surface == ProxyCorner::EXIT => true,
-                        Placement::TessellatedShells { .. } => f.owner == plan.rays.facet_of(x, y),
+                        Placement::TessellatedShells { .. } => f.owner == plan.rays().facet_of(x, y),
                         Placement::ObjectPlanes => {
-                            let d = plan.rays.ray(x, y).direction;
-                            let axis = plan.rays.planes.axis(d);
+                            let d = plan.rays().ray(x, y).direction;
+                            let axis = plan.rays().planes.axis(d);
                             f.owner == 2 * axis as u32 + u32::from(d[axis] > 0.0)
                         }
                         _ => f.owner == 0,

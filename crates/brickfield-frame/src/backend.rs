@@ -1,12 +1,12 @@
 //! The one trait that crosses crates: a backend replays plans.
 
 use brickfield_core::Image;
-use brickfield_core::glam::UVec2;
+use brickfield_core::glam::{UVec2, UVec3};
 
 use crate::FramePlan;
 
 /// Replays frame plans; decides nothing.
-pub trait Backend {
+pub trait Backend: Send {
     /// What this backend is, and what it can do.
     fn describe(&self) -> &Description;
 
@@ -21,10 +21,18 @@ pub trait Backend {
     /// What the device could not do: how much was asked, and the limit.
     fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError>;
 
-    /// Evaluates one function of the renderer on a list of inputs, in the context of a plan.
+    /// The backend as one that evaluates single functions, if it is.
+    fn as_evaluate(&mut self) -> Option<&mut dyn Evaluate> {
+        None
+    }
+}
+
+/// Evaluates single functions of a renderer, so that each can be held against its equation.
+pub trait Evaluate {
+    /// Evaluates one function on a list of inputs, in the context of a plan.
     ///
     /// # Errors
-    /// As [`render`](Self::render).
+    /// As [`Backend::render`].
     fn evaluate(
         &mut self,
         plan: &FramePlan,
@@ -35,6 +43,7 @@ pub trait Backend {
 
 /// What a backend is.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Description {
     /// `cpu`, `wgpu` or `ash`.
     pub backend: &'static str,
@@ -46,8 +55,16 @@ pub struct Description {
     pub capabilities: Capabilities,
 }
 
+impl Description {
+    /// A description.
+    pub fn new(backend: &'static str, adapter: String, driver: String, capabilities: Capabilities) -> Description {
+        Description { backend, adapter, driver, capabilities }
+    }
+}
+
 /// What a backend can do; a plan is prepared for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Capabilities {
     /// Most texels along a side of a 3-D texture.
     pub max_texture_3d: u32,
@@ -55,21 +72,51 @@ pub struct Capabilities {
     pub max_image: u32,
     /// Most bytes in a buffer that a shader reads.
     pub max_buffer_bytes: u64,
+    /// Most storage buffers that one shader stage reads or writes: Vulkan promises 4, WebGPU 8.
+    pub max_storage_buffers: u32,
     /// Bits of a filter weight (`subTexelPrecisionBits`); 23 where f32 arithmetic filters.
     pub sub_texel_bits: u32,
 }
 
+impl Capabilities {
+    /// No limit, and filters in f32 arithmetic: renderers in main memory.
+    pub const UNLIMITED: Capabilities = Capabilities {
+        max_texture_3d: u32::MAX,
+        max_image: u32::MAX,
+        max_buffer_bytes: isize::MAX as u64,
+        max_storage_buffers: u32::MAX,
+        sub_texel_bits: 23,
+    };
+}
+
 /// A rendered frame.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Frame {
     /// Linear, premultiplied RGBA.
     pub image: Image<f32>,
     /// How long it took.
     pub timing: Timing,
+    /// Bytes that were brought to the device for it: samples, index, numbers.
+    pub uploaded_bytes: u64,
+}
+
+impl Frame {
+    /// A frame for which nothing was uploaded.
+    pub fn new(image: Image<f32>, timing: Timing) -> Frame {
+        Frame { image, timing, uploaded_bytes: 0 }
+    }
+
+    /// The frame, for which so many bytes were brought to the device.
+    #[must_use]
+    pub fn with_upload(self, uploaded_bytes: u64) -> Frame {
+        Frame { uploaded_bytes, ..self }
+    }
 }
 
 /// How long a frame took, in milliseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Timing {
     /// Bringing bricks, index and transfer function to the device, and building the shader variant, if new.
     pub upload_ms: f64,
@@ -79,6 +126,13 @@ pub struct Timing {
     pub wall_ms: f64,
     /// Bringing the picture back.
     pub read_back_ms: f64,
+}
+
+impl Timing {
+    /// Rendering alone, as the caller waits for it.
+    pub fn of_rendering(wall_ms: f64) -> Timing {
+        Timing { wall_ms, ..Timing::default() }
+    }
 }
 
 /// A function of the renderer that can be held against its equation alone.
@@ -135,6 +189,10 @@ pub enum RenderError {
     ImageTooLarge { size: UVec2, limit: u32 },
     #[error("{n_bricks} bricks of {side}^3 samples do not fit a 3-D texture of at most {limit} texels a side")]
     AtlasTooLarge { n_bricks: u32, side: u32, limit: u32 },
+    #[error("a 3-D texture of {} x {} x {} texels is beyond the device's limit of {limit} a side", texels.x, texels.y, texels.z)]
+    TextureTooLarge { texels: UVec3, limit: u32 },
+    #[error("a shader with {n} storage buffers; the device allows {limit}")]
+    TooManyStorageBuffers { n: u32, limit: u32 },
     #[error("{what} of {n_bytes} bytes is beyond the device's limit of {limit} bytes")]
     BufferTooLarge { what: &'static str, n_bytes: u64, limit: u64 },
     #[error("out of device memory: {what} needs {n_bytes} bytes{}", available.map(|a| format!(", the device's heap holds {a}")).unwrap_or_default())]

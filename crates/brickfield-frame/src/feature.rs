@@ -8,13 +8,13 @@ pub enum Feature {
     HardwareFilter,
     /// Rays end when hardly anything shines through any more (fast mode).
     EarlyTermination,
-    /// Some bricks of the index are not resident: rays jump over them.
-    SkipTransparent,
-    /// Some macrocells of resident bricks are dark: rays leap over them.
+    /// Some blocks of the index are empty: rays jump over them.
+    SkipEmpty,
+    /// Some macrocells of bricks are dark: rays leap over them.
     SkipMacrocells,
     /// Tiles of the picture have beams: rays leave out what these pass over.
     SkipBesideBeams,
-    /// The cut has bricks of several levels.
+    /// Some slots are coarser than level 0.
     MultiLevel,
     /// The transfer function has several knots, and needs a lookup.
     TransferLookup,
@@ -25,7 +25,7 @@ impl Feature {
     pub const ALL: [Feature; 7] = [
         Feature::HardwareFilter,
         Feature::EarlyTermination,
-        Feature::SkipTransparent,
+        Feature::SkipEmpty,
         Feature::SkipMacrocells,
         Feature::SkipBesideBeams,
         Feature::MultiLevel,
@@ -37,7 +37,7 @@ impl Feature {
         match self {
             Feature::HardwareFilter => "hardware_filter",
             Feature::EarlyTermination => "early_termination",
-            Feature::SkipTransparent => "skip_transparent",
+            Feature::SkipEmpty => "skip_empty",
             Feature::SkipMacrocells => "skip_macrocells",
             Feature::SkipBesideBeams => "skip_beside_beams",
             Feature::MultiLevel => "multi_level",

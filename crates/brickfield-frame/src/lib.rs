@@ -1,38 +1,40 @@
 #![doc = include_str!("../README.md")]
 
 mod backend;
-mod beams;
-mod brick_set;
-mod chebyshev;
+mod content;
 mod facets;
 mod feature;
-mod held;
-mod index;
-mod macrocells;
-mod occupancy;
+mod field;
 mod pass;
 mod plan;
 mod proxy;
 mod rays;
+mod resource;
 mod sampling;
+mod skip;
+mod spoil;
 mod surfaces;
 mod uniform;
 mod value_scale;
 
-pub use backend::{Backend, Capabilities, Description, Frame, RenderError, ShaderFunction, Timing, check_memory};
-pub use beams::{Beams, Overview};
-pub use brick_set::{AtlasShape, BrickSet, BrickSetError, Decode, SampleFormat};
+pub use backend::{
+    Backend, Capabilities, Description, Evaluate, Frame, RenderError, ShaderFunction, Timing, check_memory,
+};
 pub use brickfield_optics::QuadratureRule;
+pub use content::{Chunk, Chunked, ContentId, HeldChunks};
 pub use feature::{Feature, FeatureSet};
-pub use held::Held;
-pub use index::{IndexEntry, IndexGrid};
-pub use macrocells::MacrocellRanges;
-pub use occupancy::{MACROCELL_SIDE, Occupancy};
+pub use field::{
+    AtlasShape, Decode, Field, FieldError, IndexEntry, IndexGrid, IndexLattice, Join, Places, Reach, SampleFormat,
+    Slots, SlotsError,
+};
 pub use pass::Pass;
-pub use plan::FramePlan;
+pub use plan::{Drawing, FramePlan, PlanError, PlanParts};
 pub use proxy::{ProxyCorner, ProxyGeometry, Target};
 pub use rays::{PlanRay, RayFrame};
+pub use resource::{Content, Resource};
 pub use sampling::{Division, Lengths, Mode, Sampling, SamplingError};
+pub use skip::{Beams, DarkError, DarkRegions, MACROCELL_SIDE, MacrocellRanges, Occupancy, Overview};
+pub use spoil::SpoiltPlan;
 pub use surfaces::{Placement, PlacementError, PlaneStacks, Steps};
-pub use uniform::{FrameUniforms, KnotUniform};
+pub use uniform::{FrameUniforms, KnotUniform, PlaceUniform};
 pub use value_scale::ValueScale;

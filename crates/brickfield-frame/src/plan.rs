@@ -2,77 +2,258 @@
 
 use std::sync::Arc;
 
-use brickfield_core::glam::{DVec3, UVec2, UVec3};
+use brickfield_core::glam::{UVec2, UVec3};
 use brickfield_core::{Aabb, TransferFunction};
 
 use crate::{
-    Beams, BrickSet, Feature, FeatureSet, IndexGrid, Occupancy, ProxyGeometry, RayFrame, SampleFormat, Sampling,
-    ValueScale,
+    Beams, DarkRegions, Division, Feature, FeatureSet, Field, Mode, Occupancy, Placement, ProxyGeometry, RayFrame,
+    SampleFormat, Sampling, Target, ValueScale,
 };
 
 /// Everything that a backend needs for one frame, and nothing that this frame does not need.
+///
+/// Built whole by [`new`](Self::new), which derives the visible box, beams, polygons and features from the parts; nothing
+/// changes afterwards.
 #[derive(Clone, Debug)]
 pub struct FramePlan {
-    /// Samples of the volume along x, y, z.
-    pub dims: UVec3,
+    pub(crate) field: Field,
+    pub(crate) rays: RayFrame,
+    pub(crate) domain: Aabb,
+    pub(crate) visible: Aabb,
+    pub(crate) sampling: Sampling,
+    pub(crate) transfer: TransferFunction,
+    pub(crate) occupancy: Option<Arc<Occupancy>>,
+    pub(crate) beams: Option<Arc<Beams>>,
+    pub(crate) proxy: Option<Arc<ProxyGeometry>>,
+    pub(crate) features: FeatureSet,
+}
+
+/// The parts of a plan, from which all else follows.
+#[derive(Clone, Debug)]
+pub struct PlanParts {
+    /// A value for every position.
+    pub field: Field,
     /// The rays, in sample space.
     pub rays: RayFrame,
     /// The part of sample space that is integrated (the volume's box cut by the clip box); may be empty.
     pub domain: Aabb,
-    /// A box in sample space around everything visible; empty if nothing is.
-    pub visible: Aabb,
     /// Step, rule and mode.
     pub sampling: Sampling,
     /// Extinction per world unit and colour over data values.
     pub transfer: TransferFunction,
-    /// From a position to its brick.
-    pub index: IndexGrid,
-    /// The samples of the bricks in the index.
-    pub bricks: Arc<BrickSet>,
-    /// Which macrocells of those bricks are dark; `None` where nothing inside a brick is leapt over.
-    pub occupancy: Option<Arc<Occupancy>>,
-    /// Where the rays of each tile may see something; `None` where each finds its own way.
-    pub beams: Option<Arc<Beams>>,
-    /// The polygons on which the samples are rasterised; `None` where rays are cast. Backends without a rasteriser cast rays to
-    /// the same samples.
-    pub proxy: Option<Arc<ProxyGeometry>>,
-    /// What the frame needs of a shader.
-    pub features: FeatureSet,
+    /// What rays need not look at; by default everything is looked at.
+    pub dark: DarkRegions,
+    /// How backends that can do both make the picture.
+    pub drawing: Drawing,
+}
+
+/// How backends that can do both make a picture.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Drawing {
+    /// Rays are cast, front to back.
+    #[default]
+    Rays,
+    /// Polygons are rasterised and blended, back to front; backends without a rasteriser cast rays to the same samples.
+    Polygons {
+        /// An index cell of each resident block, the farthest block first.
+        back_to_front: Vec<UVec3>,
+        /// What they are blended into.
+        target: Target,
+    },
+}
+
+/// Parts that do not make a plan.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum PlanError {
+    #[error("a domain from {} to {} in a volume from {} to {}, in sample space", domain.min, domain.max, volume.min, volume.max)]
+    Domain { domain: Aabb, volume: Aabb },
+    #[error("dark regions of another field: rays would pass over samples that are seen")]
+    OtherField,
+    #[error("polygons of spherical shells: a sphere has none; take tessellated shells")]
+    RoundPolygons,
+    #[error("polygons of whole rays: they are clipped to bricks; divide bricks")]
+    PolygonsOfRays,
+    #[error("a block to be drawn at index cell {cell}, which is not resident in an index of {dims}")]
+    NotResident { cell: UVec3, dims: UVec3 },
 }
 
 impl FramePlan {
-    /// The last sample of the volume, in sample space: positions are clamped to [0, last].
-    pub fn last_sample(&self) -> DVec3 {
-        (self.dims - 1).as_dvec3()
+    /// The plan of some parts.
+    ///
+    /// # Errors
+    /// A domain outside of the volume; dark regions of another field; polygons of surfaces that have none, or of blocks that
+    /// are not resident.
+    pub fn new(parts: PlanParts) -> Result<FramePlan, PlanError> {
+        check(&parts)?;
+        let PlanParts { field, rays, domain, sampling, transfer, dark, drawing } = parts;
+        let visible = visible_box(&field, &domain);
+        let mut plan = FramePlan {
+            field,
+            rays,
+            domain,
+            visible,
+            sampling,
+            transfer,
+            occupancy: dark.occupancy().cloned(),
+            beams: None,
+            proxy: None,
+            features: FeatureSet::default(),
+        };
+        match drawing {
+            Drawing::Rays => plan.beams = dark.overview().and_then(|o| Beams::of(&plan, o)).map(Arc::new),
+            Drawing::Polygons { back_to_front, target } => {
+                // The interior of bricks is not looked at before it is drawn.
+                plan.occupancy = None;
+                plan.proxy = Some(Arc::new(ProxyGeometry::of(&plan, &back_to_front, target)));
+            }
+        }
+        plan.features = plan.needs();
+        Ok(plan)
+    }
+
+    /// The plan with its polygons drawn in batches of at most `n_triangles` (at least 1): the picture is the same.
+    #[must_use]
+    pub fn in_batches_of(mut self, n_triangles: u32) -> FramePlan {
+        self.proxy = self.proxy.map(|proxy| Arc::new(Arc::unwrap_or_clone(proxy).in_batches_of(n_triangles)));
+        self
+    }
+
+    /// The features that the rest of the plan needs.
+    fn needs(&self) -> FeatureSet {
+        let fast = matches!(self.sampling.mode(), Mode::Fast { .. });
+        let needed = [
+            (Feature::HardwareFilter, fast),
+            (Feature::EarlyTermination, self.sampling.transmittance_floor() > 0.0),
+            (Feature::SkipEmpty, self.field.index().has_empty()),
+            (Feature::SkipMacrocells, self.occupancy.is_some()),
+            (Feature::SkipBesideBeams, self.beams.is_some()),
+            (Feature::MultiLevel, self.field.has_coarse()),
+            (Feature::TransferLookup, self.transfer.knots().len() > 1),
+        ];
+        needed.into_iter().filter_map(|(feature, is_needed)| is_needed.then_some(feature)).collect()
+    }
+
+    /// A value for every position.
+    #[inline]
+    pub fn field(&self) -> &Field {
+        &self.field
+    }
+
+    /// The rays, in sample space.
+    #[inline]
+    pub fn rays(&self) -> &RayFrame {
+        &self.rays
+    }
+
+    /// The part of sample space that is integrated; may be empty.
+    #[inline]
+    pub fn domain(&self) -> &Aabb {
+        &self.domain
+    }
+
+    /// A box in sample space around everything visible; empty if nothing is.
+    #[inline]
+    pub fn visible(&self) -> &Aabb {
+        &self.visible
+    }
+
+    /// Step, rule and mode.
+    #[inline]
+    pub fn sampling(&self) -> &Sampling {
+        &self.sampling
+    }
+
+    /// Extinction per world unit and colour over data values.
+    #[inline]
+    pub fn transfer(&self) -> &TransferFunction {
+        &self.transfer
+    }
+
+    /// Which macrocells of bricks are dark; `None` where nothing inside a brick is leapt over.
+    #[inline]
+    pub fn occupancy(&self) -> Option<&Arc<Occupancy>> {
+        self.occupancy.as_ref()
+    }
+
+    /// Where the rays of each tile may see something; `None` where each finds its own way.
+    #[inline]
+    pub fn beams(&self) -> Option<&Arc<Beams>> {
+        self.beams.as_ref()
+    }
+
+    /// The polygons on which the samples are rasterised; `None` where rays are cast.
+    #[inline]
+    pub fn proxy(&self) -> Option<&Arc<ProxyGeometry>> {
+        self.proxy.as_ref()
+    }
+
+    /// What the frame needs of a shader.
+    #[inline]
+    pub fn features(&self) -> FeatureSet {
+        self.features
     }
 
     /// The part of the domain that belongs to the block of an index cell, relative to the frame's centre.
     pub fn block_box(&self, cell: UVec3) -> Aabb {
-        let n_cells = f64::from(self.bricks.side().n_cells());
-        let level = self.index.at(cell).level();
-        let low = cell >> u32::from(level.0) << u32::from(level.0);
-        let high = low + level.stride();
-        let owned = Aabb {
-            min: DVec3::select(low.cmpeq(UVec3::ZERO), DVec3::NEG_INFINITY, low.as_dvec3() * n_cells),
-            max: DVec3::select(high.cmpge(self.index.dims()), DVec3::INFINITY, high.as_dvec3() * n_cells),
-        };
-        let b = owned.intersection(&self.domain);
+        let b = self.field.block_box(cell).intersection(&self.domain);
         Aabb { min: b.min - self.rays.center, max: b.max - self.rays.center }
     }
 
     /// How f32 arithmetic counts data values.
     pub fn value_scale(&self) -> ValueScale {
-        ValueScale::of(&self.transfer, self.bricks.decode())
+        ValueScale::of(&self.transfer, self.field.slots().decode())
     }
 
     /// Whether shaders turn what they read of a texture back into the integers that were stored: 16-bit samples where
     /// no hardware filters them. Of a fraction in [0, 1], f32 has too few digits left for what lies between two of them.
     pub fn reads_integers(&self) -> bool {
-        self.bricks.format() == SampleFormat::Unorm16 && !self.features.contains(Feature::HardwareFilter)
+        self.field.slots().format() == SampleFormat::Unorm16 && !self.features.contains(Feature::HardwareFilter)
+    }
+
+    /// Whether there is nothing to render: no pixel, or nothing visible.
+    pub fn shows_nothing(&self) -> bool {
+        self.visible.is_empty() || self.domain.is_empty() || self.size().min_element() == 0
     }
 
     /// Width and height of the picture, in pixels.
+    #[inline]
     pub fn size(&self) -> UVec2 {
         self.rays.size
     }
+}
+
+fn check(parts: &PlanParts) -> Result<(), PlanError> {
+    let (field, volume) = (&parts.field, parts.field.volume_box());
+    let Aabb { min, max } = parts.domain;
+    // NaN fails too; an empty domain may lie anywhere.
+    let is_inside = min.cmpge(volume.min).all() && max.cmple(volume.max).all();
+    if !is_inside && !(parts.domain.is_empty() && min.is_finite() && max.is_finite()) {
+        return Err(PlanError::Domain { domain: parts.domain, volume });
+    }
+    if !parts.dark.is_of(field) {
+        return Err(PlanError::OtherField);
+    }
+    let Drawing::Polygons { back_to_front, .. } = &parts.drawing else { return Ok(()) };
+    if parts.rays.placement == Placement::Shells {
+        return Err(PlanError::RoundPolygons);
+    }
+    if parts.sampling.division() == Division::Ray {
+        return Err(PlanError::PolygonsOfRays);
+    }
+    let dims = field.index().dims();
+    let is_resident = |cell: &UVec3| cell.cmplt(dims).all() && field.index().at(*cell).slot().is_some();
+    match back_to_front.iter().find(|cell| !is_resident(cell)) {
+        Some(cell) => Err(PlanError::NotResident { cell: *cell, dims }),
+        None => Ok(()),
+    }
+}
+
+/// The box around all resident blocks, as far as the domain reaches.
+pub(crate) fn visible_box(field: &Field, domain: &Aabb) -> Aabb {
+    let empty = Aabb { min: domain.min, max: domain.min };
+    let resident = field.index().resident_box(field.dims());
+    let visible = resident.map_or(empty, |b| b.intersection(domain));
+    if visible.is_empty() { empty } else { visible }
 }

@@ -2,93 +2,177 @@
 //!
 //! The layouts are held against naga's member offsets by a test of `brickfield-shaders`.
 
-use brickfield_core::Knot;
 use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{Knot, Place};
 use bytemuck::{Pod, Zeroable};
 
 use crate::{AtlasShape, FramePlan, Pass};
 
-/// The frame's uniform block; every member is 16 bytes. Positions are in sample space relative to `RayFrame::center`.
+/// The frame's uniform block: vectors of three, each followed by a number that has nothing to do with it. Positions are in
+/// sample space relative to `RayFrame::center`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct FrameUniforms {
-    /// Anchor of the picture's centre; w: distance of that anchor past the start.
-    pub anchor: [f32; 4],
-    /// Change of the anchor a pixel to the right; w: side of a pixel in the plane at distance 1 (0: parallel rays).
-    pub anchor_right: [f32; 4],
-    /// Change of the anchor a pixel down; w: distance from the eye to the plane of the anchors.
-    pub anchor_down: [f32; 4],
-    /// Direction of the picture's centre, voxels per world unit; w: least parameter (0 or minus the start).
-    pub direction: [f32; 4],
-    /// Change of the direction a pixel to the right; w: nominal step in world units.
-    pub direction_right: [f32; 4],
-    /// Change of the direction a pixel down; w: transmittance floor.
-    pub direction_down: [f32; 4],
-    /// Lower corner of the domain; w: scale from a sample as it is read to a number of [`ValueScale`](crate::ValueScale).
-    pub domain_min: [f32; 4],
-    /// Upper corner of the domain; w: offset of the same.
-    pub domain_max: [f32; 4],
-    /// Lower corner of what is visible; w: cells along a brick's side.
-    pub visible_min: [f32; 4],
-    /// Upper corner of what is visible; w: first segment of the pass.
-    pub visible_max: [f32; 4],
-    /// Sample space's origin, relative to the centre; w: end of the pass's segments.
-    pub origin: [f32; 4],
-    /// The last sample, relative to the centre; w: the stored integer from which samples are counted
-    /// ([`FramePlan::reads_integers`]).
-    pub last_sample: [f32; 4],
-    /// Cells of the index grid; w: number of knots.
-    pub index_dims: [u32; 4],
-    /// Bricks of the atlas along x, y, z; w: samples along a brick's side.
-    pub atlas_bricks: [u32; 4],
-    /// Width and height of the picture; z: first row of the pass; w: pixels along a beam's tile (1 without beams).
-    pub size: [u32; 4],
-    /// The first object-aligned planes that rays towards greater coordinates meet; w: pixels along a facet's side.
-    pub planes_low: [f32; 4],
-    /// The first that rays towards smaller coordinates meet; w: squares of facets in a row of the picture.
-    pub planes_high: [f32; 4],
-    /// Distance between planes a voxel apart, in world units; w: reserved.
-    pub voxel_world: [f32; 4],
+    /// Anchor of the picture's centre.
+    pub anchor: [f32; 3],
+    /// Distance of that anchor past the start.
+    pub anchor_past_start: f32,
+    /// Change of the anchor a pixel to the right.
+    pub anchor_right: [f32; 3],
+    /// Side of a pixel in the plane at distance 1 (0: parallel rays).
+    pub pixel: f32,
+    /// Change of the anchor a pixel down.
+    pub anchor_down: [f32; 3],
+    /// Distance from the eye to the plane of the anchors.
+    pub anchor_depth: f32,
+    /// Direction of the picture's centre, voxels per world unit.
+    pub direction: [f32; 3],
+    /// Least parameter (0 or minus the start).
+    pub least_parameter: f32,
+    /// Change of the direction a pixel to the right.
+    pub direction_right: [f32; 3],
+    /// Nominal step in world units.
+    pub step_world: f32,
+    /// Change of the direction a pixel down.
+    pub direction_down: [f32; 3],
+    /// The transmittance at which rays end.
+    pub transmittance_floor: f32,
+    /// Lower corner of the domain.
+    pub domain_min: [f32; 3],
+    /// Scale from a sample as it is read to a number of [`ValueScale`](crate::ValueScale).
+    pub sample_scale: f32,
+    /// Upper corner of the domain.
+    pub domain_max: [f32; 3],
+    /// Offset of the same.
+    pub sample_offset: f32,
+    /// Lower corner of what is visible.
+    pub visible_min: [f32; 3],
+    /// Samples of level 0 along an index cell's side.
+    pub cell_samples: f32,
+    /// Upper corner of what is visible.
+    pub visible_max: [f32; 3],
+    /// First segment of the pass.
+    pub first_segment: f32,
+    /// The first sample.
+    pub first_sample: [f32; 3],
+    /// End of the pass's segments.
+    pub end_segment: f32,
+    /// The last sample.
+    pub last_sample: [f32; 3],
+    /// The stored integer from which samples are counted ([`FramePlan::reads_integers`]).
+    pub counted_from: f32,
+    /// Where the first index cell begins.
+    pub index_origin: [f32; 3],
+    /// Pixels along a beam's tile (1 without beams).
+    pub beam_pixels: u32,
+    /// Cells of the index.
+    pub index_dims: [u32; 3],
+    /// Number of knots.
+    pub n_knots: u32,
+    /// Bricks of the atlas along x, y, z.
+    pub atlas_bricks: [u32; 3],
+    /// Samples along a brick's side.
+    pub brick_samples: u32,
+    /// Width and height of the picture.
+    pub size: [u32; 2],
+    /// First row of the pass.
+    pub first_row: u32,
+    /// Pixels along a facet's side.
+    pub facet_pixels: u32,
+    /// The first object-aligned planes that rays towards greater coordinates meet.
+    pub planes_low: [f32; 3],
+    /// Squares of facets in a row of the picture.
+    pub facet_columns: u32,
+    /// The first that rays towards smaller coordinates meet.
+    pub planes_high: [f32; 3],
+    /// Nothing.
+    pub padding_0: f32,
+    /// Distance between planes a voxel apart, in world units.
+    pub voxel_world: [f32; 3],
+    /// Nothing.
+    pub padding_1: f32,
 }
 
 /// A transfer function's knot.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct KnotUniform {
-    /// Straight linear RGB; w: extinction per world unit.
+    /// Straight linear RGB, and extinction per world unit.
     pub optics: [f32; 4],
-    /// x: data value as a number of [`ValueScale`](crate::ValueScale); y: reciprocal of the distance to the next knot (0 at the last and before a
-    /// jump's second knot); z, w: reserved.
-    pub value: [f32; 4],
+    /// Data value as a number of [`ValueScale`](crate::ValueScale).
+    pub value: f32,
+    /// Reciprocal of the distance to the next knot (0 at the last and before a jump's second knot).
+    pub per_value: f32,
+    /// Nothing.
+    pub padding: [f32; 2],
+}
+
+/// A [`Place`] as shaders read it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct PlaceUniform {
+    /// First texel.
+    pub texel: [u32; 3],
+    /// Level.
+    pub level: u32,
+    /// The first sample's position, in sample space.
+    pub first: [f32; 3],
+    /// Nothing.
+    pub padding: f32,
+    /// The last sample along the axes of space, in the slot's own samples.
+    pub last: [u32; 3],
+    /// The axes of space that the texture's axes run along, two bits each, from the lowest.
+    pub axes: u32,
 }
 
 impl FrameUniforms {
     /// The uniform block of a plan whose bricks lie in an atlas of `atlas`, for a frame in one pass.
     pub fn of(plan: &FramePlan, atlas: AtlasShape) -> FrameUniforms {
-        let rays = &plan.rays;
-        let n_cells = f64::from(plan.bricks.side().n_cells());
+        let (rays, field) = (&plan.rays, &plan.field);
+        let lattice = field.index().lattice();
         let samples = SampleScale::of(plan);
         let whole = Pass::whole_rays(0..rays.size.y);
-        let relative = |p: DVec3| p - rays.center;
+        let relative = |p: DVec3| float3(p - rays.center);
         FrameUniforms {
-            anchor: float4(rays.anchor[0], rays.anchor_past_start),
-            anchor_right: float4(rays.anchor[1], rays.pixel),
-            anchor_down: float4(rays.anchor[2], rays.anchor_depth),
-            direction: float4(rays.direction[0], 0.0 - rays.start),
-            direction_right: float4(rays.direction[1], plan.sampling.step_world()),
-            direction_down: float4(rays.direction[2], plan.sampling.transmittance_floor()),
-            domain_min: float4(relative(plan.domain.min), samples.scale),
-            domain_max: float4(relative(plan.domain.max), samples.offset),
-            visible_min: float4(relative(plan.visible.min), n_cells),
-            visible_max: float4(relative(plan.visible.max), 0.0),
-            origin: float4(-rays.center, 0.0),
-            last_sample: float4(relative(plan.last_sample()), samples.counted_from),
-            index_dims: uint4(plan.index.dims(), plan.transfer.knots().len() as u32),
-            atlas_bricks: uint4(atlas.bricks, plan.bricks.side().n_samples()),
-            size: [rays.size.x, rays.size.y, 0, plan.beams.as_ref().map_or(1, |b| b.tile_side())],
-            planes_low: float4(rays.planes.low, f64::from(rays.facet_pixels())),
-            planes_high: float4(rays.planes.high, f64::from(rays.facet_squares().x)),
-            voxel_world: float4(rays.planes.voxel_world, 0.0),
+            anchor: float3(rays.anchor[0]),
+            anchor_past_start: rays.anchor_past_start as f32,
+            anchor_right: float3(rays.anchor[1]),
+            pixel: rays.pixel as f32,
+            anchor_down: float3(rays.anchor[2]),
+            anchor_depth: rays.anchor_depth as f32,
+            direction: float3(rays.direction[0]),
+            least_parameter: (0.0 - rays.start) as f32,
+            direction_right: float3(rays.direction[1]),
+            step_world: plan.sampling.step_world() as f32,
+            direction_down: float3(rays.direction[2]),
+            transmittance_floor: plan.sampling.transmittance_floor() as f32,
+            domain_min: relative(plan.domain.min),
+            sample_scale: samples.scale as f32,
+            domain_max: relative(plan.domain.max),
+            sample_offset: samples.offset as f32,
+            visible_min: relative(plan.visible.min),
+            cell_samples: lattice.cell_samples as f32,
+            visible_max: relative(plan.visible.max),
+            first_segment: 0.0,
+            first_sample: float3(-rays.center),
+            end_segment: 0.0,
+            last_sample: relative(field.last_sample()),
+            counted_from: samples.counted_from as f32,
+            index_origin: relative(DVec3::splat(lattice.origin)),
+            beam_pixels: plan.beams.as_ref().map_or(1, |b| b.tile_side()),
+            index_dims: field.index().dims().to_array(),
+            n_knots: plan.transfer.knots().len() as u32,
+            atlas_bricks: atlas.bricks.to_array(),
+            brick_samples: atlas.side.n_samples(),
+            size: rays.size.to_array(),
+            first_row: 0,
+            facet_pixels: rays.facet_pixels(),
+            planes_low: float3(rays.planes.low),
+            facet_columns: rays.facet_squares().x,
+            planes_high: float3(rays.planes.high),
+            padding_0: 0.0,
+            voxel_world: float3(rays.planes.voxel_world),
+            padding_1: 0.0,
         }
         .in_pass(&whole)
     }
@@ -96,9 +180,9 @@ impl FrameUniforms {
     /// The uniform block for one pass.
     #[must_use]
     pub fn in_pass(mut self, pass: &Pass) -> FrameUniforms {
-        self.visible_max[3] = pass.segments.start;
-        self.origin[3] = pass.segments.end;
-        self.size[2] = pass.rows.start;
+        self.first_segment = pass.segments.start;
+        self.end_segment = pass.segments.end;
+        self.first_row = pass.rows.start;
         self
     }
 }
@@ -115,6 +199,21 @@ impl KnotUniform {
     }
 }
 
+impl PlaceUniform {
+    /// A place.
+    pub fn of(place: &Place) -> PlaceUniform {
+        let [x, y, z] = place.axes.of_texture().map(|axis| axis as u32);
+        PlaceUniform {
+            texel: place.texel.to_array(),
+            level: u32::from(place.level.0),
+            first: float3(place.first),
+            padding: 0.0,
+            last: (place.n_in_space() - UVec3::ONE).to_array(),
+            axes: x | y << 2 | z << 4,
+        }
+    }
+}
+
 /// From samples as shaders read them to numbers of the value scale: (read - counted_from) * scale + offset.
 struct SampleScale {
     counted_from: f64,
@@ -124,26 +223,24 @@ struct SampleScale {
 
 impl SampleScale {
     fn of(plan: &FramePlan) -> SampleScale {
-        let (decode, values) = (plan.bricks.decode(), plan.value_scale());
+        let (slots, values) = (plan.field.slots(), plan.value_scale());
+        let decode = slots.decode();
         let (scale, offset) = (decode.scale / values.unit(), values.number(decode.offset));
         if !plan.reads_integers() {
             return SampleScale { counted_from: 0.0, scale, offset };
         }
-        let counted_from = plan.bricks.nearest_stored(values.origin());
-        let scale = scale / plan.bricks.format().unit();
+        let counted_from = slots.nearest_stored(values.origin());
+        let scale = scale / slots.format().unit();
         SampleScale { counted_from, scale, offset: offset + counted_from * scale }
     }
 }
 
-fn knot(k: &Knot, value: f64, reciprocal: f64) -> KnotUniform {
+fn knot(k: &Knot, value: f64, per_value: f64) -> KnotUniform {
     let [r, g, b] = k.color.map(|c| c as f32);
-    KnotUniform { optics: [r, g, b, k.extinction as f32], value: [value as f32, reciprocal as f32, 0.0, 0.0] }
+    let optics = [r, g, b, k.extinction as f32];
+    KnotUniform { optics, value: value as f32, per_value: per_value as f32, padding: [0.0; 2] }
 }
 
-fn float4(v: DVec3, w: f64) -> [f32; 4] {
-    [v.x as f32, v.y as f32, v.z as f32, w as f32]
-}
-
-fn uint4(v: UVec3, w: u32) -> [u32; 4] {
-    [v.x, v.y, v.z, w]
+fn float3(v: DVec3) -> [f32; 3] {
+    v.as_vec3().to_array()
 }

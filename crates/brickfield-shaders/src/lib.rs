@@ -12,7 +12,7 @@ pub use library::{PatchError, ShaderLibrary};
 pub use passes::{passes, pixels_per_pass};
 pub use reflect::{Binding, BindingKind};
 pub use specialise::{Counts, ShaderError, Specialised, specialise};
-pub use variant::{Entry, KnotSearch, Segments, Surfaces, Variant};
+pub use variant::{Entry, FieldKind, KnotSearch, Segments, Surfaces, Variant};
 
 /// The compiler that the modules are for.
 pub use naga;

@@ -7,18 +7,45 @@ use wesl::{CompileOptions, Features, ManglerKind, ModulePath, VirtualResolver, W
 
 use crate::{ShaderError, Variant};
 
-const EMBEDDED: [(&str, &str); 11] = [
-    ("frame", include_str!("wesl/frame.wesl")),
-    ("scalar", include_str!("wesl/scalar.wesl")),
-    ("transfer", include_str!("wesl/transfer.wesl")),
-    ("rays", include_str!("wesl/rays.wesl")),
-    ("bricks", include_str!("wesl/bricks.wesl")),
-    ("quadrature", include_str!("wesl/quadrature.wesl")),
-    ("preintegrated", include_str!("wesl/preintegrated.wesl")),
-    ("segments", include_str!("wesl/segments.wesl")),
-    ("march", include_str!("wesl/march.wesl")),
-    ("proxy", include_str!("wesl/proxy.wesl")),
-    ("evaluate", include_str!("wesl/evaluate.wesl")),
+/// A module of WESL text.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Module {
+    /// Its name in patches and messages: its file's.
+    name: &'static str,
+    /// The path under which others import it. Of several modules with one path a variant chooses one.
+    path: &'static str,
+    text: Cow<'static, str>,
+}
+
+/// A module that is imported by its own name.
+const fn own(name: &'static str, text: &'static str) -> Module {
+    Module { name, path: name, text: Cow::Borrowed(text) }
+}
+
+/// One of several modules of a path.
+const fn one_of(path: &'static str, name: &'static str, text: &'static str) -> Module {
+    Module { name, path, text: Cow::Borrowed(text) }
+}
+
+const EMBEDDED: [Module; 18] = [
+    own("frame", include_str!("wesl/frame.wesl")),
+    own("scalar", include_str!("wesl/scalar.wesl")),
+    own("transfer", include_str!("wesl/transfer.wesl")),
+    own("rays", include_str!("wesl/rays.wesl")),
+    own("index", include_str!("wesl/index.wesl")),
+    own("texels", include_str!("wesl/texels.wesl")),
+    one_of("field", "field/bricks", include_str!("wesl/field/bricks.wesl")),
+    one_of("field", "field/placed", include_str!("wesl/field/placed.wesl")),
+    own("quadrature", include_str!("wesl/quadrature.wesl")),
+    own("preintegrated", include_str!("wesl/preintegrated.wesl")),
+    own("segments", include_str!("wesl/segments.wesl")),
+    own("ending", include_str!("wesl/ending.wesl")),
+    one_of("integrate", "integrate/constant", include_str!("wesl/integrate/constant.wesl")),
+    one_of("integrate", "integrate/rays", include_str!("wesl/integrate/rays.wesl")),
+    one_of("integrate", "integrate/bricks", include_str!("wesl/integrate/bricks.wesl")),
+    own("march", include_str!("wesl/march.wesl")),
+    own("proxy", include_str!("wesl/proxy.wesl")),
+    own("evaluate", include_str!("wesl/evaluate.wesl")),
 ];
 
 /// The shader sources: modules of WESL text by name.
@@ -27,7 +54,7 @@ const EMBEDDED: [(&str, &str); 11] = [
 /// cases notice.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ShaderLibrary {
-    modules: Vec<(&'static str, Cow<'static, str>)>,
+    modules: Vec<Module>,
 }
 
 /// Why a source was not patched.
@@ -52,12 +79,12 @@ impl Default for ShaderLibrary {
 impl ShaderLibrary {
     /// The sources of this crate.
     pub fn embedded() -> ShaderLibrary {
-        ShaderLibrary { modules: EMBEDDED.map(|(name, text)| (name, Cow::Borrowed(text))).to_vec() }
+        ShaderLibrary { modules: EMBEDDED.to_vec() }
     }
 
     /// The names and texts of the modules.
     pub fn modules(&self) -> impl Iterator<Item = (&'static str, &str)> {
-        self.modules.iter().map(|(name, text)| (*name, text.as_ref()))
+        self.modules.iter().map(|module| (module.name, module.text.as_ref()))
     }
 
     /// The library with `from` replaced by `to` in one module. Texts are compared token by token: neither comments nor white
@@ -80,10 +107,10 @@ impl ShaderLibrary {
     fn patch(&self, module: &str, name: Option<&str>, from: &str, to: &str) -> Result<ShaderLibrary, PatchError> {
         let mut library = self.clone();
         let names = || self.modules().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
-        let (_, text) = library
+        let Module { text, .. } = library
             .modules
             .iter_mut()
-            .find(|(name, _)| *name == module)
+            .find(|m| m.name == module)
             .ok_or_else(|| PatchError::NoModule { module: module.to_owned(), modules: names() })?;
         let tokens = tokens(text);
         let scopes = match name {
@@ -105,8 +132,10 @@ impl ShaderLibrary {
     /// The WGSL text of a variant: what it needs, and nothing else.
     pub(crate) fn wgsl(&self, variant: &Variant) -> Result<String, ShaderError> {
         let mut resolver = VirtualResolver::new();
-        for (name, text) in self.modules() {
-            resolver.add_module(path(name)?, text.into());
+        let chosen = variant.chosen_modules();
+        let is_needed = |m: &&Module| m.name == m.path || chosen.contains(&m.name);
+        for module in self.modules.iter().filter(is_needed) {
+            resolver.add_module(path(module.path)?, module.text.as_ref().into());
         }
         let mut compiler = Wesl::new_barebones().set_custom_resolver(resolver);
         compiler.set_options(options(variant)).set_mangler(ManglerKind::None).use_sourcemap(true);
@@ -195,8 +224,8 @@ mod tests {
     #[test]
     fn patches_ignore_comments_and_white_space_and_keep_to_a_declaration() {
         let text = "const A = 1; // two\nfn f() {\n    // a\n    if b { return x; }\n    return  x ; // y\n}\n\nfn g() { return x; }\n";
-        let library = ShaderLibrary { modules: vec![("m", text.into())] };
-        let patched = |name, from| library.patched_in("m", name, from, "0").map(|l| l.modules[0].1.to_string());
+        let library = ShaderLibrary { modules: vec![own("m", text)] };
+        let patched = |name, from| library.patched_in("m", name, from, "0").map(|l| l.modules[0].text.to_string());
         assert_eq!(patched("A", "1").unwrap(), text.replace("A = 1", "A = 0"));
         assert_eq!(patched("g", "return\nx").unwrap(), text.replace("g() { return x", "g() { 0"));
         assert_eq!(patched("f", "} return x;").unwrap(), text.replace("}\n    return  x ;", "0"));

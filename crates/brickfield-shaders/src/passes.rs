@@ -27,13 +27,13 @@ pub fn pixels_per_pass(plan: &FramePlan, group_height: u32) -> u64 {
 
 /// Whether rays need several passes.
 pub(crate) fn has_long_rays(plan: &FramePlan) -> bool {
-    plan.rays.n_segments > segments_per_pass(plan)
+    plan.rays().n_segments > segments_per_pass(plan)
 }
 
 /// Ranges that cover all segments; the outer ones are open, so that rounding loses none.
 fn segment_ranges(plan: &FramePlan) -> Vec<std::ops::Range<f32>> {
     let most = segments_per_pass(plan);
-    let n = (plan.rays.n_segments / most).ceil().max(1.0) as u32;
+    let n = (plan.rays().n_segments / most).ceil().max(1.0) as u32;
     let cut = |i: u32| match i {
         0 => f32::MIN,
         i if i == n => f32::MAX,
@@ -50,17 +50,19 @@ fn segments_per_pass(plan: &FramePlan) -> f64 {
 /// How often the loops go round for the bricks that a ray crosses, in every pass: once for each, for what earlier passes saw of
 /// it, and for the two segments that its faces cut.
 fn rounds_of_bricks(plan: &FramePlan) -> f64 {
-    match plan.sampling.division() {
+    match plan.sampling().division() {
         Division::Ray => 0.0,
-        Division::Brick => f64::from(plan.index.dims().element_sum()) * (3.0 + 2.0 * rounds_per_segment(plan)),
+        Division::Brick => {
+            f64::from(plan.field().index().dims().element_sum()) * (3.0 + 2.0 * rounds_per_segment(plan))
+        }
     }
 }
 
 /// How often the loops of the march go round for a segment, at most: once each to find its block, to enter it and to
 /// integrate; for each piece between knots; and for each halving of a search that is a loop.
 fn rounds_per_segment(plan: &FramePlan) -> f64 {
-    let rule = plan.sampling.rule();
-    let n_knots = plan.transfer.knots().len() as f64;
+    let rule = plan.sampling().rule();
+    let n_knots = plan.transfer().knots().len() as f64;
     let pieces = if rule == QuadratureRule::PreIntegrated { n_knots + 1.0 } else { 0.0 };
     let search = match KnotSearch::of(plan) {
         KnotSearch::Unrolled(_) => 0.0,
@@ -70,9 +72,10 @@ fn rounds_per_segment(plan: &FramePlan) -> f64 {
 }
 
 fn rows_per_pass(plan: &FramePlan, group_height: u32) -> u32 {
-    let voxels_per_segment = plan.rays.direction[0].length() * plan.sampling.step_world() * plan.rays.least_stretch();
-    let n_segments = (plan.visible.diagonal() / voxels_per_segment).clamp(1.0, segments_per_pass(plan));
-    let nodes_per_row = n_segments * plan.sampling.rule().nodes().len() as f64 * f64::from(plan.size().x);
+    let voxels_per_segment =
+        plan.rays().direction[0].length() * plan.sampling().step_world() * plan.rays().least_stretch();
+    let n_segments = (plan.visible().diagonal() / voxels_per_segment).clamp(1.0, segments_per_pass(plan));
+    let nodes_per_row = n_segments * plan.sampling().rule().nodes().len() as f64 * f64::from(plan.size().x);
     // A float that is too large becomes the largest integer.
     ((MOST_NODES / nodes_per_row) as u32 / group_height).max(1).saturating_mul(group_height)
 }

@@ -1,17 +1,20 @@
 //! What is left in a module: the resources that a backend must bind.
 
-use naga::{AddressSpace, ImageClass, ImageDimension, Module, StorageAccess, StorageFormat, TypeInner};
+use brickfield_frame::Resource;
+use naga::{AddressSpace, GlobalVariable, ImageClass, ImageDimension, Module, StorageAccess, StorageFormat, TypeInner};
 
 /// A resource of group 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Binding {
     /// Its binding number.
     pub index: u32,
-    /// What is to be bound.
+    /// What is to be bound, by its name in the shader.
+    pub resource: Resource,
+    /// As what it is bound.
     pub kind: BindingKind,
 }
 
-/// What a binding holds.
+/// As what a resource is bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum BindingKind {
     /// A uniform buffer ([`brickfield_frame::FrameUniforms`]).
@@ -28,14 +31,30 @@ pub enum BindingKind {
     StorageImage,
 }
 
-/// The bindings of a module in ascending order; `None` if a resource is none of ours.
-pub(crate) fn bindings(module: &Module) -> Option<Vec<Binding>> {
+impl BindingKind {
+    /// Whether it counts among a stage's storage buffers.
+    pub const fn is_storage_buffer(self) -> bool {
+        matches!(self, BindingKind::StorageRead | BindingKind::StorageReadWrite)
+    }
+}
+
+/// The bindings of a module in ascending order.
+///
+/// # Errors
+/// The name of a variable that is no resource of ours, or of a kind that no backend binds.
+pub(crate) fn bindings(module: &Module) -> Result<Vec<Binding>, String> {
     let bound = module.global_variables.iter().filter_map(|(_, g)| g.binding.map(|b| (b.binding, g)));
-    let mut bindings = bound
-        .map(|(index, g)| Some(Binding { index, kind: kind(g.space, &module.types[g.ty].inner)? }))
-        .collect::<Option<Vec<_>>>()?;
+    let binding = |(index, g): (u32, &GlobalVariable)| {
+        let name = g.name.as_deref().unwrap_or_default();
+        let kind = kind(g.space, &module.types[g.ty].inner);
+        match (Resource::of_name(name), kind) {
+            (Some(resource), Some(kind)) => Ok(Binding { index, resource, kind }),
+            _ => Err(name.to_owned()),
+        }
+    };
+    let mut bindings = bound.map(binding).collect::<Result<Vec<_>, _>>()?;
     bindings.sort();
-    Some(bindings)
+    Ok(bindings)
 }
 
 fn kind(space: AddressSpace, inner: &TypeInner) -> Option<BindingKind> {

@@ -1,5 +1,6 @@
 //! From a variant to a module with nothing in it that the variant does not need.
 
+use brickfield_frame::{Feature, RenderError, Resource};
 use naga::Module;
 use naga::back::spv;
 use naga::compact::{KeepUnused, compact};
@@ -51,8 +52,10 @@ pub enum ShaderError {
     Parse { message: String },
     #[error("validation: {message}")]
     Validate { message: String },
-    #[error("a resource of a kind that no backend binds")]
-    Binding,
+    #[error("the shader's variable `{name}` is no resource that a backend binds")]
+    Binding { name: String },
+    #[error("a shader with {n} storage buffers; the device allows {limit}")]
+    TooManyStorageBuffers { n: u32, limit: u32 },
     #[error("no entry point is left")]
     NoEntry,
     #[error("SPIR-V: {message}")]
@@ -62,6 +65,15 @@ pub enum ShaderError {
 impl ShaderError {
     pub(crate) fn compile(error: impl std::fmt::Display) -> ShaderError {
         ShaderError::Compile { message: error.to_string() }
+    }
+}
+
+impl From<ShaderError> for RenderError {
+    fn from(error: ShaderError) -> RenderError {
+        match error {
+            ShaderError::TooManyStorageBuffers { n, limit } => RenderError::TooManyStorageBuffers { n, limit },
+            error => RenderError::Shader { message: error.to_string() },
+        }
     }
 }
 
@@ -87,14 +99,50 @@ impl ShaderLibrary {
         validate(&module, &wgsl)?;
         compact(&mut module, KeepUnused::No);
         let info = validate(&module, &wgsl)?;
-        let bindings = bindings(&module).ok_or(ShaderError::Binding)?;
+        let bindings = bindings(&module).map_err(|name| ShaderError::Binding { name })?;
         let workgroup_size = module.entry_points.first().ok_or(ShaderError::NoEntry)?.workgroup_size;
         let counts = counts(&module, &wgsl);
         Ok(Specialised { variant: *variant, module, info, wgsl, bindings, workgroup_size, counts })
     }
 }
 
+/// Features that only save time, in the order in which they are given up where a device has too few storage buffers. Without
+/// them no pixel changes.
+const GIVEN_UP: [Feature; 2] = [Feature::SkipBesideBeams, Feature::SkipMacrocells];
+
+impl ShaderLibrary {
+    /// As [`specialise`](Self::specialise), for a device that allows so many storage buffers in a stage: where they are too few,
+    /// features that only save time are left out.
+    ///
+    /// # Errors
+    /// As [`specialise`](Self::specialise); and if the variant cannot do with so few.
+    pub fn specialise_within(&self, variant: &Variant, max_storage_buffers: u32) -> Result<Specialised, ShaderError> {
+        let mut variant = *variant;
+        let mut shader = self.specialise(&variant)?;
+        for feature in GIVEN_UP {
+            if shader.n_storage_buffers() > max_storage_buffers && variant.features.contains(feature) {
+                variant.features = variant.features.without(feature);
+                shader = self.specialise(&variant)?;
+            }
+        }
+        match shader.n_storage_buffers() {
+            n if n > max_storage_buffers => Err(ShaderError::TooManyStorageBuffers { n, limit: max_storage_buffers }),
+            _ => Ok(shader),
+        }
+    }
+}
+
 impl Specialised {
+    /// Whether the shader reads or writes a resource.
+    pub fn uses(&self, resource: Resource) -> bool {
+        self.bindings.iter().any(|b| b.resource == resource)
+    }
+
+    /// Storage buffers that a stage has.
+    pub fn n_storage_buffers(&self) -> u32 {
+        self.bindings.iter().filter(|b| b.kind.is_storage_buffer()).count() as u32
+    }
+
     /// The module as SPIR-V 1.3 for Vulkan, with all its entry points.
     ///
     /// Reads are restricted to their resource (at most 15 % of the time on lavapipe, mostly nothing), as wgpu does.

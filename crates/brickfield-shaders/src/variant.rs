@@ -1,17 +1,21 @@
 //! Which shader a plan needs.
 
-use brickfield_frame::{Division, Feature, FeatureSet, FramePlan, Lengths, Placement, QuadratureRule, ShaderFunction};
+use brickfield_frame::{
+    Division, Feature, FeatureSet, FramePlan, Lengths, Placement, Places, QuadratureRule, ShaderFunction,
+};
 
 use crate::passes::has_long_rays;
 
 /// One shader of the family: what is compiled in. A key for pipeline caches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct Variant {
-    /// What the scene needs; the rest is left out.
+    /// The features that the scene needs; the rest is left out.
     ///
-    /// Without [`Feature::MultiLevel`] all resident bricks are of level 0, without [`Feature::SkipTransparent`] all blocks
-    /// are resident.
+    /// Without [`Feature::MultiLevel`] all slots are of level 0, without [`Feature::SkipEmpty`] all blocks are resident.
     pub features: FeatureSet,
+    /// How values are found.
+    pub field: FieldKind,
     /// How segments are integrated.
     pub rule: QuadratureRule,
     /// Between which surfaces segments lie, of what, and for which lengths they count.
@@ -24,6 +28,28 @@ pub struct Variant {
     pub integer_samples: bool,
     /// What is run.
     pub entry: Entry,
+}
+
+/// The module that answers for the field (`package::field`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum FieldKind {
+    /// Bricks of one size: arithmetic finds their samples.
+    #[default]
+    Bricks,
+    /// Slots of several sizes: a table says where their samples lie.
+    Placed,
+}
+
+impl FieldKind {
+    /// All kinds.
+    pub const ALL: [FieldKind; 2] = [FieldKind::Bricks, FieldKind::Placed];
+
+    const fn module(self) -> &'static str {
+        match self {
+            FieldKind::Bricks => "field/bricks",
+            FieldKind::Placed => "field/placed",
+        }
+    }
 }
 
 /// The segments of a plan, as far as shaders differ.
@@ -49,8 +75,8 @@ pub enum Surfaces {
 impl Segments {
     /// The segments of a plan.
     pub fn of(plan: &FramePlan) -> Segments {
-        let sampling = &plan.sampling;
-        let surfaces = match plan.rays.placement {
+        let sampling = plan.sampling();
+        let surfaces = match plan.rays().placement {
             Placement::Shells => Surfaces::Shells,
             Placement::TessellatedShells { .. } => Surfaces::TessellatedShells,
             Placement::ViewportPlanes => Surfaces::ViewportPlanes,
@@ -91,8 +117,8 @@ impl Surfaces {
     }
 }
 
-/// What makes a ray ask for bricks.
-const BRICKS: [Feature; 3] = [Feature::TransferLookup, Feature::SkipTransparent, Feature::SkipMacrocells];
+/// The features for which a ray asks the field.
+const READS_FIELD: [Feature; 3] = [Feature::TransferLookup, Feature::SkipEmpty, Feature::SkipMacrocells];
 
 /// How the knots of a transfer function are searched.
 ///
@@ -117,8 +143,8 @@ impl KnotSearch {
 
     /// The search that a plan needs.
     pub fn of(plan: &FramePlan) -> KnotSearch {
-        match plan.features.contains(Feature::TransferLookup) {
-            true => KnotSearch::among(plan.transfer.knots().len()),
+        match plan.features().contains(Feature::TransferLookup) {
+            true => KnotSearch::among(plan.transfer().knots().len()),
             false => KnotSearch::Unrolled(0),
         }
     }
@@ -172,17 +198,49 @@ impl Entry {
 }
 
 impl Variant {
+    /// A shader for short rays between shells, through bricks whose samples are no 16-bit integers, with two to four knots.
+    pub fn new(features: FeatureSet, rule: QuadratureRule, entry: Entry) -> Variant {
+        Variant {
+            features,
+            field: FieldKind::default(),
+            rule,
+            segments: Segments::default(),
+            search: KnotSearch::Unrolled(2),
+            long_rays: false,
+            integer_samples: false,
+            entry,
+        }
+    }
+
     /// The shader that replays `plan`.
     pub fn of(plan: &FramePlan, entry: Entry) -> Variant {
         Variant {
-            features: plan.features,
-            rule: plan.sampling.rule(),
+            features: plan.features(),
+            field: match plan.field().slots().places() {
+                Places::Even(_) => FieldKind::Bricks,
+                Places::Table { .. } => FieldKind::Placed,
+            },
+            rule: plan.sampling().rule(),
             segments: Segments::of(plan),
             search: KnotSearch::of(plan),
             long_rays: entry == Entry::March && has_long_rays(plan),
             integer_samples: plan.reads_integers(),
             entry,
         }
+    }
+
+    /// Of modules that share a path, those that are compiled.
+    pub(crate) fn chosen_modules(self) -> [&'static str; 2] {
+        let integrate = match self.segments.division {
+            Division::Brick => "integrate/bricks",
+            Division::Ray if self.reads_field() => "integrate/rays",
+            Division::Ray => "integrate/constant",
+        };
+        [self.field.module(), integrate]
+    }
+
+    fn reads_field(self) -> bool {
+        READS_FIELD.into_iter().any(|f| self.features.contains(f)) || self.segments.division == Division::Brick
     }
 
     /// The conditions (`@if(name)`) that hold.
@@ -196,7 +254,8 @@ impl Variant {
         let derived = [
             ("one_node", !two_nodes),
             ("two_nodes", two_nodes),
-            ("bricks", BRICKS.into_iter().any(has) || self.segments.division == Division::Brick),
+            ("reads_field", self.reads_field()),
+            ("wide_blocks", has(Feature::MultiLevel) || has(Feature::SkipEmpty) || self.field == FieldKind::Placed),
             ("long_rays", self.long_rays),
             ("integer_samples", self.integer_samples),
         ];

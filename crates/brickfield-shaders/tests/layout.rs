@@ -2,9 +2,9 @@
 
 use std::mem::{offset_of, size_of};
 
-use brickfield_frame::{FeatureSet, FrameUniforms, KnotUniform, QuadratureRule};
+use brickfield_frame::{FeatureSet, FrameUniforms, KnotUniform, PlaceUniform, QuadratureRule};
 use brickfield_shaders::naga::{Module, TypeInner};
-use brickfield_shaders::{Entry, KnotSearch, Segments, Variant, specialise};
+use brickfield_shaders::{Entry, FieldKind, Variant, specialise};
 
 macro_rules! host {
     ($t:ty, $($member:ident),*) => { (vec![$((stringify!($member), offset_of!($t, $member))),*], size_of::<$t>()) };
@@ -25,19 +25,17 @@ fn assert_equal(module: &Module, name: &str, (members, size): (Vec<(&str, usize)
 
 #[test]
 fn host_and_shader_structs_have_the_same_layout() {
-    let variant = Variant {
-        features: FeatureSet::all(),
-        rule: QuadratureRule::MidpointExponential,
-        segments: Segments::default(),
-        search: KnotSearch::Unrolled(2),
-        long_rays: false,
-        integer_samples: false,
-        entry: Entry::March,
-    };
+    let mut variant = Variant::new(FeatureSet::all(), QuadratureRule::MidpointExponential, Entry::March);
+    variant.features = variant.features.without(brickfield_frame::Feature::SkipMacrocells);
+    variant.field = FieldKind::Placed;
     let module = specialise(&variant).unwrap().module;
     #[rustfmt::skip]
-    assert_equal(&module, "Frame", host!(FrameUniforms, anchor, anchor_right, anchor_down, direction, direction_right,
-        direction_down, domain_min, domain_max, visible_min, visible_max, origin, last_sample, index_dims, atlas_bricks, size,
-        planes_low, planes_high, voxel_world));
-    assert_equal(&module, "Knot", host!(KnotUniform, optics, value));
+    assert_equal(&module, "Frame", host!(FrameUniforms, anchor, anchor_past_start, anchor_right, pixel, anchor_down,
+        anchor_depth, direction, least_parameter, direction_right, step_world, direction_down, transmittance_floor,
+        domain_min, sample_scale, domain_max, sample_offset, visible_min, cell_samples, visible_max, first_segment,
+        first_sample, end_segment, last_sample, counted_from, index_origin, beam_pixels, index_dims, n_knots,
+        atlas_bricks, brick_samples, size, first_row, facet_pixels, planes_low, facet_columns, planes_high, padding_0,
+        voxel_world, padding_1));
+    assert_equal(&module, "Knot", host!(KnotUniform, optics, value, per_value, padding));
+    assert_equal(&module, "Place", host!(PlaceUniform, texel, level, first, padding, last, axes));
 }

@@ -1,106 +1,132 @@
-//! Every variant compiles, and holds nothing that it does not need.
+//! Variants compile, and hold nothing that they do not need.
 
-use brickfield_frame::{Division, Feature, FeatureSet, Lengths, QuadratureRule, ShaderFunction};
-use brickfield_shaders::{BindingKind, Entry, KnotSearch, Segments, Specialised, Surfaces, Variant, specialise};
+use std::collections::HashSet;
 
-const SEARCH: KnotSearch = KnotSearch::Unrolled(2);
-
-fn feature_sets() -> impl Iterator<Item = FeatureSet> {
-    (0..1u32 << Feature::ALL.len())
-        .map(|bits| Feature::ALL.into_iter().filter(|f| bits >> *f as u32 & 1 == 1).collect())
-}
-
-/// A variant for short rays through samples that are no 16-bit integers.
-fn variant(features: FeatureSet, rule: QuadratureRule, entry: Entry) -> Variant {
-    Variant {
-        features,
-        rule,
-        segments: Segments::default(),
-        search: SEARCH,
-        long_rays: false,
-        integer_samples: false,
-        entry,
-    }
-}
+use brickfield_frame::{Division, Feature, FeatureSet, Lengths, QuadratureRule, Resource, ShaderFunction};
+use brickfield_shaders::{
+    BindingKind, Entry, FieldKind, KnotSearch, Segments, ShaderError, ShaderLibrary, Specialised, Surfaces, Variant,
+    specialise,
+};
 
 fn compile(variant: &Variant) -> Specialised {
     specialise(variant).unwrap_or_else(|e| panic!("{variant:?}: {e}"))
 }
 
 fn march(features: FeatureSet, rule: QuadratureRule) -> Specialised {
-    compile(&variant(features, rule, Entry::March))
+    compile(&Variant::new(features, rule, Entry::March))
 }
 
-fn indices(shader: &Specialised) -> Vec<u32> {
-    shader.bindings.iter().map(|b| b.index).collect()
+fn resources(shader: &Specialised) -> Vec<Resource> {
+    shader.bindings.iter().map(|b| b.resource).collect()
+}
+
+/// The options of a variant, each as a number below its count.
+const N_OPTIONS: usize = Feature::ALL.len() + 7;
+
+fn counts() -> [usize; N_OPTIONS] {
+    let mut counts = [2; N_OPTIONS];
+    let others =
+        [FieldKind::ALL.len(), QuadratureRule::ALL.len(), Segments::all().count(), KnotSearch::all().count(), 2, 2];
+    counts[Feature::ALL.len()..N_OPTIONS - 1].copy_from_slice(&others);
+    counts[N_OPTIONS - 1] = Entry::all().count();
+    counts
+}
+
+/// The variant of some options; `None` if no plan asks for it.
+fn variant(options: &[usize; N_OPTIONS]) -> Option<Variant> {
+    let features = Feature::ALL.into_iter().zip(options).filter(|(_, o)| **o == 1).map(|(f, _)| f).collect();
+    let [field, rule, segments, search, long_rays, integer_samples, entry] = options[Feature::ALL.len()..] else {
+        panic!("seven options behind the features")
+    };
+    let mut variant = Variant::new(features, QuadratureRule::ALL[rule], Entry::all().nth(entry)?);
+    variant.field = FieldKind::ALL[field];
+    variant.segments = Segments::all().nth(segments)?;
+    variant.search = KnotSearch::all().nth(search)?;
+    variant.long_rays = long_rays == 1;
+    variant.integer_samples = integer_samples == 1;
+    let Segments { surfaces, division, lengths } = variant.segments;
+    let is_nominal = lengths == Lengths::Nominal;
+    let is_drawn = surfaces != Surfaces::Shells && division == Division::Brick && !variant.long_rays;
+    let is_asked_for = (!is_nominal || variant.rule == QuadratureRule::MidpointExponential)
+        && (variant.entry != Entry::Proxy || is_drawn)
+        && (variant.field == FieldKind::Bricks || !features.contains(Feature::SkipMacrocells));
+    is_asked_for.then_some(variant)
+}
+
+/// All pairs of two options' values that some variant has.
+fn pairs(options: &[usize; N_OPTIONS]) -> impl Iterator<Item = [usize; 4]> {
+    (0..N_OPTIONS).flat_map(move |i| (0..i).map(move |j| [i, options[i], j, options[j]]))
+}
+
+/// Variants in which every pair of values of any two options occurs that can occur at all (of 40,000 random variants).
+fn covering() -> Vec<Variant> {
+    let mut state = 1u64;
+    let mut random = |n: usize| {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 33) as usize % n
+    };
+    let mut candidates = Vec::new();
+    while candidates.len() < 40_000 {
+        let options = counts().map(&mut random);
+        candidates.extend(variant(&options).map(|v| (options, v)));
+    }
+    let mut open: HashSet<[usize; 4]> = candidates.iter().flat_map(|(options, _)| pairs(options)).collect();
+    let mut chosen = Vec::new();
+    while !open.is_empty() {
+        // The best of a few that have something new.
+        let gain = |options: &[usize; N_OPTIONS]| pairs(options).filter(|p| open.contains(p)).count();
+        let new = candidates.iter().filter(|(options, _)| gain(options) > 0).take(60);
+        let (options, variant) = new.max_by_key(|(options, _)| gain(options)).expect("an open pair is of a candidate");
+        open.retain(|pair| !pairs(options).any(|p| p == *pair));
+        chosen.push(*variant);
+    }
+    chosen
 }
 
 #[test]
-fn every_variant_of_the_march_compiles() {
-    for features in feature_sets() {
-        for rule in QuadratureRule::ALL {
-            for (long_rays, integer_samples) in [(false, false), (true, false), (false, true), (true, true)] {
-                let variant = Variant { long_rays, integer_samples, ..variant(features, rule, Entry::March) };
-                let shader = compile(&variant);
-                assert!(shader.spirv().unwrap().len() > 100);
+fn every_pair_of_options_compiles_and_binds_what_it_names() {
+    let variants = covering();
+    assert!((100..1000).contains(&variants.len()), "{}", variants.len());
+    for variant in variants {
+        let shader = compile(&variant);
+        assert!(shader.spirv().unwrap().len() > 100);
+        let uses = |resource| shader.uses(resource);
+        match variant.entry {
+            Entry::March => {
                 assert_eq!(shader.workgroup_size, [8, 8, 1]);
-                assert_eq!(indices(&shader).contains(&8), long_rays);
+                assert_eq!(uses(Resource::SeenBefore), variant.long_rays);
+                let has_facets = variant.segments.surfaces == Surfaces::TessellatedShells;
+                assert_eq!(uses(Resource::Facets), has_facets);
+                let reads = uses(Resource::Index) && variant.features.contains(Feature::TransferLookup);
+                assert_eq!(uses(Resource::Places), uses(Resource::Index) && variant.field == FieldKind::Placed);
+                assert!(!reads || uses(Resource::Atlas));
+            }
+            Entry::Proxy => {
+                assert_eq!(shader.module.entry_points.len(), 2);
+                let of_rays = [Resource::Index, Resource::Picture, Resource::SeenBefore, Resource::Beams];
+                assert!(!of_rays.into_iter().any(uses), "{:?}", resources(&shader));
+            }
+            Entry::Evaluate(_) => {
+                let outputs = |b: &&brickfield_shaders::Binding| b.resource == Resource::Outputs;
+                let outputs = shader.bindings.iter().find(outputs).unwrap();
+                assert_eq!(outputs.kind, BindingKind::StorageReadWrite);
             }
         }
     }
 }
 
 #[test]
-fn every_kind_of_segments_compiles() {
-    // With every feature, none, and all but one.
-    let all = FeatureSet::all();
-    let sets = Feature::ALL.map(|f| all.without(f)).into_iter().chain([all, FeatureSet::default()]);
-    for features in sets {
-        for (segments, rule) in Segments::all().flat_map(|s| QuadratureRule::ALL.map(|rule| (s, rule))) {
-            if segments.lengths == Lengths::Nominal && rule != QuadratureRule::MidpointExponential {
-                continue;
-            }
-            for long_rays in [false, true] {
-                let variant = Variant { segments, long_rays, ..variant(features, rule, Entry::March) };
-                let shader = compile(&variant);
-                assert_eq!(indices(&shader).contains(&12), segments.surfaces == Surfaces::TessellatedShells);
-                assert!(shader.spirv().unwrap().len() > 100);
-            }
-        }
-    }
-}
-
-#[test]
-fn every_kind_of_polygons_compiles() {
-    let all = FeatureSet::all();
-    for features in Feature::ALL.map(|f| all.without(f)).into_iter().chain([all, FeatureSet::default()]) {
-        for (segments, rule) in Segments::all().flat_map(|s| QuadratureRule::ALL.map(|rule| (s, rule))) {
-            let is_known = segments.lengths == Lengths::True || rule == QuadratureRule::MidpointExponential;
-            if segments.division == Division::Ray || segments.surfaces == Surfaces::Shells || !is_known {
-                continue;
-            }
-            let shader = compile(&Variant { segments, ..variant(features, rule, Entry::Proxy) });
-            assert_eq!(shader.module.entry_points.len(), 2);
-            assert!(shader.spirv().unwrap().len() > 100);
-            // No march, no index, no picture to store to.
-            assert!([3, 5, 8, 9, 10].iter().all(|index| !indices(&shader).contains(index)), "{:?}", indices(&shader));
-        }
-    }
-}
-
-#[test]
-fn every_variant_of_every_function_compiles() {
-    for features in feature_sets() {
-        for rule in QuadratureRule::ALL {
-            for function in ShaderFunction::ALL {
-                for integer_samples in [false, true] {
-                    let entry = Entry::Evaluate(function);
-                    let shader = compile(&Variant { integer_samples, ..variant(features, rule, entry) });
-                    assert!(shader.bindings.iter().any(|b| b.index == 7 && b.kind == BindingKind::StorageReadWrite));
-                }
-            }
-        }
-    }
+fn a_device_with_few_storage_buffers_gets_a_shader_without_shortcuts() {
+    let mut general = Variant::new(FeatureSet::all(), QuadratureRule::MidpointExponential, Entry::March);
+    general.long_rays = true;
+    general.segments.surfaces = Surfaces::TessellatedShells;
+    let library = ShaderLibrary::embedded();
+    let within = |limit| library.specialise_within(&general, limit);
+    assert_eq!(within(6).unwrap().n_storage_buffers(), 6);
+    let four = within(4).unwrap();
+    assert_eq!(resources(&four).iter().filter(|r| [Resource::Beams, Resource::Occupancy].contains(r)).count(), 0);
+    assert!(within(5).unwrap().uses(Resource::Occupancy) && !within(5).unwrap().uses(Resource::Beams));
+    assert_eq!(within(3).unwrap_err(), ShaderError::TooManyStorageBuffers { n: 4, limit: 3 });
 }
 
 #[test]
@@ -111,7 +137,9 @@ fn every_search_compiles_and_only_the_last_loops() {
         for (rule, entry) in
             [(QuadratureRule::MidpointExponential, classify), (QuadratureRule::PreIntegrated, Entry::March)]
         {
-            let shader = compile(&Variant { search, ..variant(features, rule, entry) });
+            let mut variant = Variant::new(features, rule, entry);
+            variant.search = search;
+            let shader = compile(&variant);
             assert!(entry == Entry::March || shader.wgsl.contains("for (") == (search == KnotSearch::Loop));
         }
     }
@@ -121,12 +149,18 @@ fn every_search_compiles_and_only_the_last_loops() {
 fn what_a_scene_does_not_need_is_left_out() {
     let rule = QuadratureRule::MidpointExponential;
     let all = FeatureSet::all();
-    assert_eq!(indices(&march(all, rule)), [0, 1, 2, 3, 4, 5, 9, 10]);
-    assert_eq!(indices(&march(all.without(Feature::HardwareFilter), rule)), [0, 1, 3, 4, 5, 9, 10]);
-    assert_eq!(indices(&march(all.without(Feature::SkipMacrocells), rule)), [0, 1, 2, 3, 4, 5, 10]);
-    assert_eq!(indices(&march(all.without(Feature::SkipBesideBeams), rule)), [0, 1, 2, 3, 4, 5, 9]);
-    assert_eq!(indices(&march(FeatureSet::default(), rule)), [0, 4, 5]);
-    assert_eq!(indices(&march(FeatureSet::default().with(Feature::SkipTransparent), rule)), [0, 3, 4, 5]);
+    use Resource::{Atlas, AtlasSampler, Beams, Frame, Index, Knots, Occupancy, Picture};
+    assert_eq!(resources(&march(all, rule)), [Frame, Atlas, AtlasSampler, Index, Knots, Picture, Occupancy, Beams]);
+    for (feature, resource) in [
+        (Feature::HardwareFilter, AtlasSampler),
+        (Feature::SkipMacrocells, Occupancy),
+        (Feature::SkipBesideBeams, Beams),
+    ] {
+        assert!(!march(all.without(feature), rule).uses(resource), "{}", resource.name());
+    }
+    assert_eq!(resources(&march(FeatureSet::default(), rule)), [Frame, Knots, Picture]);
+    let skipping = march(FeatureSet::default().with(Feature::SkipEmpty), rule);
+    assert_eq!(resources(&skipping), [Frame, Index, Knots, Picture]);
 
     let general = march(all, rule);
     for feature in Feature::ALL.into_iter().filter(|f| *f != Feature::HardwareFilter) {
@@ -139,10 +173,10 @@ fn what_a_scene_does_not_need_is_left_out() {
     for (text, feature) in [
         ("textureSampleLevel", Feature::HardwareFilter),
         ("fn ended", Feature::EarlyTermination),
-        ("resident", Feature::SkipTransparent),
-        ("fn macrocells_at", Feature::SkipMacrocells),
-        ("beam", Feature::SkipBesideBeams),
-        ("scale", Feature::MultiLevel),
+        ("resident", Feature::SkipEmpty),
+        ("fn dark_around", Feature::SkipMacrocells),
+        ("let beam", Feature::SkipBesideBeams),
+        ("    scale: f32", Feature::MultiLevel),
         ("fn knot_below", Feature::TransferLookup),
     ] {
         assert!(general.wgsl.contains(text) && !march(all.without(feature), rule).wgsl.contains(text), "{text}");
@@ -152,13 +186,13 @@ fn what_a_scene_does_not_need_is_left_out() {
 
 #[test]
 fn functions_bind_what_they_read() {
-    let bindings = |function| {
-        let rule = QuadratureRule::Gauss2;
+    use Resource::{Atlas, Frame, Index, Inputs, Knots, Outputs};
+    let of = |function| {
         let features = FeatureSet::default().with(Feature::TransferLookup);
-        indices(&compile(&variant(features, rule, Entry::Evaluate(function))))
+        resources(&compile(&Variant::new(features, QuadratureRule::Gauss2, Entry::Evaluate(function))))
     };
-    assert_eq!(bindings(ShaderFunction::Alpha), [6, 7]);
-    assert_eq!(bindings(ShaderFunction::Classify), [0, 4, 6, 7]);
-    assert_eq!(bindings(ShaderFunction::Sample), [0, 1, 3, 6, 7]);
-    assert_eq!(bindings(ShaderFunction::RayAnchor), [0, 6, 7]);
+    assert_eq!(of(ShaderFunction::Alpha), [Inputs, Outputs]);
+    assert_eq!(of(ShaderFunction::Classify), [Frame, Knots, Inputs, Outputs]);
+    assert_eq!(of(ShaderFunction::Sample), [Frame, Atlas, Index, Inputs, Outputs]);
+    assert_eq!(of(ShaderFunction::RayAnchor), [Frame, Inputs, Outputs]);
 }

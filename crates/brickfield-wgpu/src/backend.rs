@@ -5,8 +5,8 @@ use std::time::Instant;
 use brickfield_core::Image;
 use brickfield_core::glam::UVec2;
 use brickfield_frame::{
-    Backend, Description, Feature, Frame, FramePlan, FrameUniforms, RenderError, ShaderFunction, Target, Timing,
-    check_memory,
+    Backend, Description, Evaluate, Feature, Frame, FramePlan, FrameUniforms, RenderError, Resource, SampleFormat,
+    ShaderFunction, Target, Timing, check_memory,
 };
 use brickfield_shaders::{Entry, ShaderLibrary, Variant, passes, pixels_per_pass, shader_inputs, shader_outputs};
 use wgpu::{BufferUsages, Features};
@@ -17,18 +17,18 @@ use crate::device::Device;
 use crate::picture::{self, Maker};
 use crate::pipeline::{Pipeline, Pipelines, Program};
 use crate::polygons::Polygons;
-use crate::scene::{Scene, unbound};
+use crate::resources::{Brought, Resources, missing};
 use crate::{AdapterChoice, OpenError, adapter};
 
 /// Renders frame plans through wgpu, without a window.
 ///
-/// On the device stay: the atlas of the last plan's bricks (as long as a plan holds the same [`Arc`](std::sync::Arc)), the
-/// pipeline of each shader variant, the picture, and buffers that grow when they must.
+/// On the device stay: the contents of the last plan, of which the next one brings what is not there; the pipeline of each shader
+/// variant, the picture, and buffers that grow when they must.
 pub struct WgpuBackend {
     device: Device,
     pipelines: Pipelines,
     clock: Option<Clock>,
-    scene: Scene,
+    resources: Resources,
     polygons: Polygons,
     staging: Reused,
     outputs: Outputs,
@@ -52,7 +52,7 @@ impl WgpuBackend {
         Ok(WgpuBackend {
             pipelines: Pipelines::default(),
             clock: Clock::new(&device),
-            scene: Scene::new(&device),
+            resources: Resources::new(&device),
             polygons: Polygons::new(),
             staging: picture::staging(),
             outputs: Outputs {
@@ -78,8 +78,8 @@ impl WgpuBackend {
     }
 
     fn check_features(&self, plan: &FramePlan) -> Result<(), RenderError> {
-        let filtered_floats = plan.features.contains(Feature::HardwareFilter)
-            && plan.bricks.format() == brickfield_frame::SampleFormat::Float32;
+        let filtered_floats =
+            plan.features().contains(Feature::HardwareFilter) && plan.field().slots().format() == SampleFormat::Float32;
         if filtered_floats && !self.device.has(Features::FLOAT32_FILTERABLE) {
             return Err(RenderError::Unsupported { what: "filter 32-bit floats in hardware (FLOAT32_FILTERABLE)" });
         }
@@ -88,7 +88,7 @@ impl WgpuBackend {
 
     /// Whether the device blends what a plan's polygons are drawn into.
     fn check_blending(&self, plan: &FramePlan) -> Result<(), RenderError> {
-        let blends_floats = plan.proxy.as_ref().is_some_and(|proxy| proxy.target() == Target::Float32);
+        let blends_floats = plan.proxy().is_some_and(|proxy| proxy.target() == Target::Float32);
         if blends_floats && !self.device.has(Features::FLOAT32_BLENDABLE) {
             return Err(RenderError::Unsupported { what: "blend 32-bit floats (FLOAT32_BLENDABLE): take rgba16float" });
         }
@@ -99,16 +99,18 @@ impl WgpuBackend {
     fn march(&mut self, plan: &FramePlan, uniforms: FrameUniforms) -> Result<(Option<f64>, f64), RenderError> {
         let pipeline = self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?;
         let [x, y, _] = pipeline.workgroup_size;
-        if pipeline.binds(8) {
-            self.scene.seen_before.reserve(&self.device, pixels_per_pass(plan, y) * size_of::<[f32; 4]>() as u64)?;
+        if pipeline.uses(Resource::SeenBefore) {
+            let n_bytes = pixels_per_pass(plan, y) * size_of::<[f32; 4]>() as u64;
+            self.resources.buffer(Resource::SeenBefore).reserve(&self.device, n_bytes)?;
         }
         let clock = self.clock.as_ref();
         let (mut device_ms, mut wall_ms) = (clock.map(|_| 0.0), 0.0);
         for pass in passes(plan, y) {
             let started = Instant::now();
             let groups = [plan.size().x.div_ceil(x), (pass.rows.len() as u32).div_ceil(y), 1];
-            self.scene.uniforms.write(&self.device, bytemuck::bytes_of(&uniforms.in_pass(&pass)))?;
-            dispatch(&self.device, pipeline, &self.scene, groups, clock)?;
+            let uniforms = uniforms.in_pass(&pass);
+            self.resources.buffer(Resource::Frame).write(&self.device, bytemuck::bytes_of(&uniforms))?;
+            dispatch(&self.device, pipeline, &self.resources, groups, clock)?;
             self.device.wait("rendering")?;
             wall_ms += milliseconds_since(started);
             let pass_ms = clock.map(|c| c.milliseconds(&self.device)).transpose()?;
@@ -119,12 +121,12 @@ impl WgpuBackend {
 
     fn evaluate_some(&mut self, variant: Variant, inputs: &[[f32; 4]]) -> Result<Vec<[f32; 4]>, RenderError> {
         let n_bytes = size_of_val(inputs) as u64;
-        self.scene.inputs.write(&self.device, bytemuck::cast_slice(inputs))?;
-        self.scene.results.reserve(&self.device, n_bytes)?;
+        self.resources.buffer(Resource::Inputs).write(&self.device, bytemuck::cast_slice(inputs))?;
+        self.resources.buffer(Resource::Outputs).reserve(&self.device, n_bytes)?;
         let pipeline = self.pipelines.of(&self.device, variant)?;
         let groups = (inputs.len() as u32).div_ceil(pipeline.workgroup_size[0]);
-        dispatch(&self.device, pipeline, &self.scene, [groups, 1, 1], None)?;
-        self.outputs.read(&self.device, &self.scene.results, n_bytes)
+        dispatch(&self.device, pipeline, &self.resources, [groups, 1, 1], None)?;
+        self.outputs.read(&self.device, self.resources.buffer(Resource::Outputs), n_bytes)
     }
 }
 
@@ -137,37 +139,46 @@ impl Backend for WgpuBackend {
         let size = plan.size();
         self.check_size(size)?;
         check_memory(size)?;
-        if size.min_element() == 0 || plan.visible.is_empty() || plan.domain.is_empty() {
-            return Ok(Frame { image: Image::transparent(size), timing: Timing::default() });
+        if plan.shows_nothing() {
+            return Ok(Frame::new(Image::transparent(size), Timing::default()));
         }
         self.check_features(plan)?;
         self.check_blending(plan)?;
         let started = Instant::now();
-        let maker = plan.proxy.as_ref().map_or(Maker::Rays, |proxy| Maker::Polygons(proxy.target()));
+        let maker = plan.proxy().map_or(Maker::Rays, |proxy| Maker::Polygons(proxy.target()));
         let pipeline = match maker {
             Maker::Rays => self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?,
             Maker::Polygons(target) => {
                 self.pipelines.blending_into(&self.device, Variant::of(plan, Entry::Proxy), target)?
             }
         };
-        let uniforms = self.scene.update(&self.device, plan, pipeline)?;
-        self.scene.resize(&self.device, size, maker)?;
-        if let Some(proxy) = &plan.proxy {
-            self.polygons.hold(&self.device, proxy)?;
+        let Brought { uniforms, mut n_bytes } = self.resources.bring(&self.device, plan, pipeline)?;
+        self.resources.resize(&self.device, size, maker)?;
+        if let Some(proxy) = plan.proxy() {
+            n_bytes += self.polygons.bring(&self.device, proxy)?;
         }
         self.device.queue.submit([]);
         self.device.wait("uploading")?;
         let upload_ms = milliseconds_since(started);
-        let (device_ms, wall_ms) = match &plan.proxy {
+        let (device_ms, wall_ms) = match plan.proxy() {
             None => self.march(plan, uniforms)?,
-            Some(proxy) => self.polygons.draw(&self.device, pipeline, &self.scene, proxy, self.clock.as_ref())?,
+            Some(proxy) => self.polygons.draw(&self.device, pipeline, &self.resources, proxy, self.clock.as_ref())?,
         };
         let started = Instant::now();
-        let Some(picture) = &self.scene.picture else { return Err(unbound()) };
+        let picture = self.resources.picture.as_ref().ok_or_else(|| missing(Resource::Picture))?;
         let image = picture.read(&self.device, &mut self.staging)?;
-        Ok(Frame { image, timing: Timing { upload_ms, device_ms, wall_ms, read_back_ms: milliseconds_since(started) } })
+        let mut timing = Timing::of_rendering(wall_ms);
+        (timing.upload_ms, timing.device_ms) = (upload_ms, device_ms);
+        timing.read_back_ms = milliseconds_since(started);
+        Ok(Frame::new(image, timing).with_upload(n_bytes))
     }
 
+    fn as_evaluate(&mut self) -> Option<&mut dyn Evaluate> {
+        Some(self)
+    }
+}
+
+impl Evaluate for WgpuBackend {
     fn evaluate(
         &mut self,
         plan: &FramePlan,
@@ -177,7 +188,7 @@ impl Backend for WgpuBackend {
         self.check_features(plan)?;
         let variant = Variant::of(plan, Entry::Evaluate(function));
         let pipeline = self.pipelines.of(&self.device, variant)?;
-        self.scene.update(&self.device, plan, pipeline)?;
+        self.resources.bring(&self.device, plan, pipeline)?;
         let mut results = Vec::with_capacity(inputs.len());
         for some in shader_inputs(plan, function, inputs).chunks(EVALUATED_AT_ONCE) {
             results.extend(self.evaluate_some(variant, some)?);
@@ -188,7 +199,7 @@ impl Backend for WgpuBackend {
 
 impl Outputs {
     fn read(&mut self, device: &Device, results: &Reused, n_bytes: u64) -> Result<Vec<[f32; 4]>, RenderError> {
-        let Some(from) = results.buffer() else { return Err(unbound()) };
+        let from = results.buffer().ok_or_else(|| missing(Resource::Outputs))?;
         let to = self.staging.reserve(device, n_bytes)?;
         device.checked("copying the results", n_bytes, || {
             let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -206,12 +217,14 @@ impl Outputs {
 fn dispatch(
     device: &Device,
     pipeline: &Pipeline,
-    scene: &Scene,
+    resources: &Resources,
     groups: [u32; 3],
     clock: Option<&Clock>,
 ) -> Result<(), RenderError> {
-    let bound = scene.bind(device, pipeline)?;
-    let Program::Compute(program) = &pipeline.program else { return Err(unbound()) };
+    let bound = resources.bind(device, pipeline)?;
+    let Program::Compute(program) = &pipeline.program else {
+        return Err(RenderError::Unsupported { what: "compute with a shader of polygons" });
+    };
     device.checked("running a shader", 0, || {
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {

@@ -1,6 +1,6 @@
 //! Buffers that are kept from frame to frame.
 
-use brickfield_frame::RenderError;
+use brickfield_frame::{Chunked, HeldChunks, RenderError};
 use wgpu::BufferUsages;
 
 use crate::device::Device;
@@ -12,40 +12,98 @@ pub(crate) struct Reused {
     buffer: Option<wgpu::Buffer>,
     /// Bytes in use.
     n_bytes: u64,
+    /// The chunks that are in it.
+    held: HeldChunks,
 }
 
+/// Most bytes of chunks that are gathered on the host at a time.
+const BYTES_AT_ONCE: usize = 16 << 20;
+
 impl Reused {
-    pub(crate) const fn new(what: &'static str, usage: BufferUsages) -> Reused {
-        Reused { what, usage, buffer: None, n_bytes: 0 }
+    pub(crate) fn new(what: &'static str, usage: BufferUsages) -> Reused {
+        Reused { what, usage, buffer: None, n_bytes: 0, held: HeldChunks::default() }
     }
 
-    /// Makes room for `n_bytes`.
+    /// Makes room for `n_bytes`; a buffer that must grow loses its content.
     pub(crate) fn reserve(&mut self, device: &Device, n_bytes: u64) -> Result<&wgpu::Buffer, RenderError> {
-        let limit = self.limit(device);
-        if n_bytes > limit {
-            return Err(RenderError::BufferTooLarge { what: self.what, n_bytes, limit });
-        }
+        self.check(device, n_bytes)?;
         self.n_bytes = n_bytes.max(16);
         let kept = self.buffer.take().filter(|b| b.size() >= self.n_bytes);
         let buffer = match kept {
             Some(buffer) => buffer,
-            None => device.checked(self.what, n_bytes, || {
-                device.device.create_buffer(&wgpu::BufferDescriptor {
-                    label: Some(self.what),
-                    size: self.n_bytes.next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
-                    usage: self.usage,
-                    mapped_at_creation: false,
-                })
-            })?,
+            None => {
+                self.held.forget();
+                self.create(device, self.n_bytes)?
+            }
         };
         Ok(self.buffer.insert(buffer))
     }
 
-    /// Writes `bytes`, a multiple of four.
-    pub(crate) fn write(&mut self, device: &Device, bytes: &[u8]) -> Result<(), RenderError> {
-        let what = self.what;
-        let buffer = self.reserve(device, bytes.len() as u64)?;
-        device.checked(what, bytes.len() as u64, || device.queue.write_buffer(buffer, 0, bytes))
+    /// Writes `bytes`, a multiple of four; how many they are.
+    pub(crate) fn write(&mut self, device: &Device, bytes: &[u8]) -> Result<u64, RenderError> {
+        let (what, n_bytes) = (self.what, bytes.len() as u64);
+        let buffer = self.reserve(device, n_bytes)?;
+        device.checked(what, n_bytes, || device.queue.write_buffer(buffer, 0, bytes))?;
+        Ok(n_bytes)
+    }
+
+    /// Brings the chunks that are not there, each a multiple of four bytes; the bytes that were brought.
+    pub(crate) fn bring(&mut self, device: &Device, content: &dyn Chunked) -> Result<u64, RenderError> {
+        if self.held.has_all(content) {
+            return Ok(0);
+        }
+        self.make_room(device, content.n_bytes())?;
+        let (what, Some(buffer)) = (self.what, &self.buffer) else { return Ok(0) };
+        let (mut n_bytes, chunk_bytes) = (0, content.chunk_bytes());
+        for run in self.held.missing(content) {
+            for first in run.clone().step_by((BYTES_AT_ONCE / chunk_bytes).max(1)) {
+                let last = run.end.min(first + (BYTES_AT_ONCE / chunk_bytes).max(1));
+                let chunks = (first..last).filter_map(|i| content.chunk(i));
+                let bytes: Vec<u8> = chunks.flat_map(|(_, bytes)| bytes).copied().collect();
+                let offset = (first * chunk_bytes) as u64;
+                device.checked(what, bytes.len() as u64, || device.queue.write_buffer(buffer, offset, &bytes))?;
+                n_bytes += bytes.len() as u64;
+            }
+        }
+        self.held.hold(content);
+        Ok(n_bytes)
+    }
+
+    /// Makes room for `n_bytes` behind what is there; a buffer that must grow gets a quarter more than it had.
+    fn make_room(&mut self, device: &Device, n_bytes: u64) -> Result<(), RenderError> {
+        let Some(old) = self.buffer.take_if(|b| b.size() < n_bytes) else {
+            return self.reserve(device, n_bytes).map(drop);
+        };
+        self.check(device, n_bytes)?;
+        self.n_bytes = n_bytes;
+        let size = n_bytes.max((old.size() + old.size() / 4).min(self.limit(device)));
+        let larger = self.create(device, size)?;
+        device.checked(self.what, size, || {
+            let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            encoder.copy_buffer_to_buffer(&old, 0, &larger, 0, old.size());
+            device.queue.submit([encoder.finish()]);
+        })?;
+        self.buffer = Some(larger);
+        Ok(())
+    }
+
+    fn create(&self, device: &Device, n_bytes: u64) -> Result<wgpu::Buffer, RenderError> {
+        device.checked(self.what, n_bytes, || {
+            device.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(self.what),
+                size: n_bytes.next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
+                usage: self.usage,
+                mapped_at_creation: false,
+            })
+        })
+    }
+
+    fn check(&self, device: &Device, n_bytes: u64) -> Result<(), RenderError> {
+        let limit = self.limit(device);
+        match n_bytes > limit {
+            true => Err(RenderError::BufferTooLarge { what: self.what, n_bytes, limit }),
+            false => Ok(()),
+        }
     }
 
     /// The bytes in use, to be bound; `None` before the first write.

@@ -50,12 +50,8 @@ impl Device {
         }));
         let (device, queue) =
             opened.map_err(|e| OpenError::NoDevice { adapter: info.name.clone(), message: e.to_string() })?;
-        let description = Description {
-            backend: "wgpu",
-            driver: driver(&info),
-            adapter: info.name,
-            capabilities: capabilities(&limits),
-        };
+        let driver = driver(&info);
+        let description = Description::new("wgpu", info.name, driver, capabilities(&limits));
         let faults = Arc::new(Faults::default());
         watch(&device, &faults);
         Ok(Device { device, queue, description, faults })
@@ -134,10 +130,11 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 }
 
 fn capabilities(limits: &wgpu::Limits) -> Capabilities {
-    Capabilities {
-        max_texture_3d: limits.max_texture_dimension_3d,
-        max_image: limits.max_texture_dimension_2d,
-        max_buffer_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
-        sub_texel_bits: SUB_TEXEL_BITS,
-    }
+    let mut capabilities = Capabilities::UNLIMITED;
+    capabilities.max_texture_3d = limits.max_texture_dimension_3d;
+    capabilities.max_image = limits.max_texture_dimension_2d;
+    capabilities.max_buffer_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    capabilities.max_storage_buffers = limits.max_storage_buffers_per_shader_stage;
+    capabilities.sub_texel_bits = SUB_TEXEL_BITS;
+    capabilities
 }

@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 
 mod adapter;
-mod atlas;
 mod backend;
 mod buffer;
 mod clock;
@@ -9,7 +8,8 @@ mod device;
 mod picture;
 mod pipeline;
 mod polygons;
-mod scene;
+mod resources;
+mod texture;
 
 pub use adapter::{AdapterChoice, AdapterSummary, OpenError, adapters};
 pub use backend::WgpuBackend;

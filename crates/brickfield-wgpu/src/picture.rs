@@ -100,7 +100,7 @@ impl Picture {
 }
 
 /// What a picture comes back through.
-pub(crate) const fn staging() -> Reused {
+pub(crate) fn staging() -> Reused {
     Reused::new("reading the picture back", BufferUsages::MAP_READ.union(BufferUsages::COPY_DST))
 }
 

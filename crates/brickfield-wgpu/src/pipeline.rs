@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-use brickfield_frame::{ProxyCorner, RenderError, Target};
+use brickfield_frame::{ProxyCorner, RenderError, Resource, Target};
 use brickfield_shaders::{Binding, BindingKind, Entry, ShaderLibrary, Specialised, Variant};
 
 use crate::device::Device;
@@ -58,13 +58,14 @@ impl Pipelines {
 }
 
 impl Pipeline {
-    pub(crate) fn binds(&self, index: u32) -> bool {
-        self.bindings.iter().any(|b| b.index == index)
+    /// Whether the shader reads or writes a resource.
+    pub(crate) fn uses(&self, resource: Resource) -> bool {
+        self.bindings.iter().any(|b| b.resource == resource)
     }
 }
 
 fn build(device: &Device, library: &ShaderLibrary, variant: &Variant, target: Target) -> Result<Pipeline, RenderError> {
-    let shader = library.specialise(variant).map_err(|e| RenderError::Shader { message: e.to_string() })?;
+    let shader = library.specialise_within(variant, device.description.capabilities.max_storage_buffers)?;
     let n_bytes = shader.wgsl.len() as u64;
     device.checked("building a shader variant", n_bytes, || from_shader(&device.device, shader, target))
 }

@@ -1,20 +1,19 @@
 //! Polygons, rasterised and blended over each other.
 
-use std::sync::Arc;
 use std::time::Instant;
 
-use brickfield_frame::{Held, ProxyGeometry, RenderError};
+use brickfield_frame::{ContentId, ProxyGeometry, RenderError};
 use wgpu::BufferUsages;
 
 use crate::buffer::Reused;
 use crate::clock::{Clock, milliseconds_since};
 use crate::device::Device;
 use crate::pipeline::{Pipeline, Program};
-use crate::scene::{Scene, unbound};
+use crate::resources::Resources;
 
 /// The polygons on the device.
 pub(crate) struct Polygons {
-    held: Held<ProxyGeometry>,
+    held: Option<ContentId>,
     corners: Reused,
     indices: Reused,
 }
@@ -22,29 +21,30 @@ pub(crate) struct Polygons {
 impl Polygons {
     pub(crate) fn new() -> Polygons {
         Polygons {
-            held: Held::nothing(),
+            held: None,
             corners: Reused::new("the polygons' corners", BufferUsages::VERTEX | BufferUsages::COPY_DST),
             indices: Reused::new("the polygons' triangles", BufferUsages::INDEX | BufferUsages::COPY_DST),
         }
     }
 
-    /// Brings polygons to the device, if they are not there.
-    pub(crate) fn hold(&mut self, device: &Device, proxy: &Arc<ProxyGeometry>) -> Result<(), RenderError> {
-        if !self.held.is(proxy) {
-            self.held = Held::nothing();
-            self.corners.write(device, bytemuck::cast_slice(proxy.corners()))?;
-            self.indices.write(device, bytemuck::cast_slice(proxy.indices()))?;
-            self.held = Held::of(proxy);
+    /// Brings polygons to the device, if they are not there; the bytes that were brought.
+    pub(crate) fn bring(&mut self, device: &Device, proxy: &ProxyGeometry) -> Result<u64, RenderError> {
+        if self.held == Some(proxy.id()) {
+            return Ok(0);
         }
-        Ok(())
+        self.held = None;
+        let corners = self.corners.write(device, bytemuck::cast_slice(proxy.corners()))?;
+        let indices = self.indices.write(device, bytemuck::cast_slice(proxy.indices()))?;
+        self.held = Some(proxy.id());
+        Ok(corners + indices)
     }
 
-    /// Draws them into the scene's picture, batch by batch; device and wall time in milliseconds.
+    /// Draws them into the picture, batch by batch; device and wall time in milliseconds.
     pub(crate) fn draw(
         &self,
         device: &Device,
         pipeline: &Pipeline,
-        scene: &Scene,
+        resources: &Resources,
         proxy: &ProxyGeometry,
         clock: Option<&Clock>,
     ) -> Result<(Option<f64>, f64), RenderError> {
@@ -54,7 +54,7 @@ impl Polygons {
         let batches = if proxy.batches().is_empty() { std::slice::from_ref(&nothing) } else { proxy.batches() };
         for (i, batch) in batches.iter().enumerate() {
             let load = if i == 0 { wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT) } else { wgpu::LoadOp::Load };
-            self.draw_batch(device, pipeline, scene, (batch.clone(), load), clock)?;
+            self.draw_batch(device, pipeline, resources, (batch.clone(), load), clock)?;
             device.wait("rendering")?;
             let batch_ms = clock.map(|c| c.milliseconds(device)).transpose()?;
             device_ms = device_ms.zip(batch_ms).map(|(sum, ms)| sum + ms);
@@ -66,16 +66,16 @@ impl Polygons {
         &self,
         device: &Device,
         pipeline: &Pipeline,
-        scene: &Scene,
+        resources: &Resources,
         (batch, load): (std::ops::Range<u32>, wgpu::LoadOp<wgpu::Color>),
         clock: Option<&Clock>,
     ) -> Result<(), RenderError> {
-        let bound = scene.bind(device, pipeline)?;
-        let (Program::Polygons(program), Some(picture)) = (&pipeline.program, &scene.picture) else {
-            return Err(unbound());
-        };
-        let (Some(corners), Some(indices)) = (self.corners.buffer(), self.indices.buffer()) else {
-            return Err(unbound());
+        let bound = resources.bind(device, pipeline)?;
+        let (corners, indices) = (self.corners.buffer(), self.indices.buffer());
+        let (Program::Polygons(program), Some(picture), Some(corners), Some(indices)) =
+            (&pipeline.program, &resources.picture, corners, indices)
+        else {
+            return Err(RenderError::Shader { message: "polygons are drawn before they are brought".to_owned() });
         };
         device.checked("drawing polygons", 0, || {
             let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());

@@ -1,13 +1,11 @@
 //! From a scene to a frame plan.
 
-use std::sync::Arc;
-
 use brickfield_bricks::BrickTree;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BrickId, BrickLayout, Level, ValueRange};
 use brickfield_frame::{
-    Beams, Division, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, Placement, PlacementError,
-    ProxyGeometry, RayFrame, Sampling, SamplingError, Steps,
+    DarkRegions, Division, Drawing, FramePlan, IndexEntry, Placement, PlacementError, PlanError, PlanParts, RayFrame,
+    Sampling, SamplingError, Steps,
 };
 use brickfield_lod::{Selection, back_to_front, select_cut};
 use brickfield_optics::QuadratureRule;
@@ -38,10 +36,6 @@ pub enum PrepareError {
         "a selection of bricks of {} in {} samples, for an octree of bricks of {} in {}", selected.1, selected.0, own.1, own.0
     )]
     ForeignSelection { selected: (UVec3, u32), own: (UVec3, u32) },
-    #[error("polygons of spherical shells: a sphere has none; take tessellated shells")]
-    RoundPolygons,
-    #[error("polygons of whole rays: they are clipped to bricks; divide bricks")]
-    PolygonsOfRays,
     #[error(
         "about {n_polygons:.1e} polygons; at most {limit} are possible: take a larger step, larger bricks or a coarser level"
     )]
@@ -52,6 +46,8 @@ pub enum PrepareError {
     Sampling(#[from] SamplingError),
     #[error(transparent)]
     Placement(#[from] PlacementError),
+    #[error(transparent)]
+    Plan(#[from] PlanError),
 }
 
 /// Most pixels along a side of a picture.
@@ -70,19 +66,27 @@ pub const MAX_SEGMENTS: u32 = 1 << 24;
 /// The plan of a frame: selects the cut that the scene's criteria ask for, drops what the transfer function and the view make
 /// invisible, gathers the rest.
 ///
-/// `residency` carries the bricks from frame to frame.
+/// `residency` carries the bricks from frame to frame. A scene that is drawn again has its plan at once: nothing is selected,
+/// compared or copied.
 ///
 /// # Errors
 /// A picture size, step, clip box, data value or number of bricks out of range.
 pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Result<FramePlan, PrepareError> {
     check_size(scene.size)?;
-    prepare_selection(tree, scene, &select_cut(tree.layout(), tree.grid(), &scene.view(), &scene.detail), residency)
+    residency.serve(tree);
+    if let Some(plan) = residency.plan_of(scene) {
+        return Ok(plan);
+    }
+    let selection = select_cut(tree.layout(), tree.grid(), &scene.view(), &scene.detail);
+    let plan = plan_selection(tree, scene, &selection, residency)?;
+    residency.remember(scene, &plan);
+    Ok(plan)
 }
 
 /// The plan of a frame of bricks that were selected before, by filters of one's own for example
 /// ([`select_by`](brickfield_lod::select_by)); the scene's criteria are not asked.
 ///
-/// Bricks that the selection ignores are not there, whatever the scene's [`Skipping`]: what they hold is transparent, and so are
+/// Bricks that the selection ignores are not there, whatever the scene's [`Skipping`]: their blocks are empty, and so are
 /// the segments of [`QuadratureRule::PreIntegrated`] that end in them.
 ///
 /// # Errors
@@ -94,8 +98,17 @@ pub fn prepare_selection(
     residency: &mut Residency,
 ) -> Result<FramePlan, PrepareError> {
     check_size(scene.size)?;
+    residency.serve(tree);
+    plan_selection(tree, scene, selection, residency)
+}
+
+fn plan_selection(
+    tree: &BrickTree,
+    scene: &Scene,
+    selection: &Selection,
+    residency: &mut Residency,
+) -> Result<FramePlan, PrepareError> {
     check_values(tree)?;
-    check_technique(scene)?;
     check_layout(tree, selection)?;
     let grid = tree.grid();
     let domain = clipped_domain(tree, scene.clip)?;
@@ -111,66 +124,31 @@ pub fn prepare_selection(
     let rays = RayFrame::new(&scene.camera, grid, scene.size, &volume_box(tree), &steps);
     check_segments(rays.n_segments)?;
     check_facets(&rays)?;
-    let resident = resident_bricks(tree, scene, selection, &domain);
+    let resident = resident_bricks(tree, scene, selection, &domain, residency);
     if resident.len() >= IndexEntry::MAX_SLOTS as usize {
         return Err(PrepareError::TooManyBricks { n_bricks: resident.len(), limit: IndexEntry::MAX_SLOTS });
     }
-    let index = index_grid(tree, &resident);
-    let visible = visible_box(tree, &resident, &domain);
-    let levels_differ = resident.iter().any(|id| id.level != Level(0));
-    let ordered = match scene.technique {
-        Technique::RayCasting => Vec::new(),
-        Technique::Polygons(_) => {
+    let drawing = match scene.technique {
+        Technique::RayCasting => Drawing::Rays,
+        Technique::Polygons(target) => {
             check_polygons(tree, &rays, step_world, resident.len())?;
-            from_back_to_front(tree, scene, &resident)
+            Drawing::Polygons { back_to_front: from_back_to_front(tree, scene, &resident), target }
         }
     };
-    let bricks = residency.hold(tree, resident);
-    let (occupancy, overview) = match scene.skipping {
-        // What is inside bricks is not looked at before it is drawn.
-        _ if scene.technique != Technique::RayCasting => (None, None),
-        Skipping::On => {
-            let occupancy = residency.occupancy(&scene.transfer);
-            let overview = residency.overview(&index, occupancy.as_ref());
-            (occupancy, overview)
-        }
-        Skipping::Off => (None, None),
+    let field = residency.hold(tree, resident);
+    // The interior of bricks is not looked at before polygons are drawn.
+    let dark = match (scene.skipping, scene.technique) {
+        (Skipping::On, Technique::RayCasting) => residency.dark(&scene.transfer),
+        _ => DarkRegions::default(),
     };
-    let mut plan = FramePlan {
-        dims: grid.dims(),
-        rays,
-        domain,
-        visible,
-        sampling,
-        transfer: scene.transfer.clone(),
-        index,
-        bricks,
-        occupancy,
-        beams: None,
-        proxy: None,
-        features: FeatureSet::default(),
-    };
-    if let Technique::Polygons(target) = scene.technique {
-        plan.proxy = Some(Arc::new(ProxyGeometry::of(&plan, &ordered, target)));
-    }
-    plan.beams = overview.and_then(|overview| Beams::of(&plan, &overview)).map(Arc::new);
-    plan.features = features(&plan, levels_differ);
-    Ok(plan)
+    let transfer = scene.transfer.clone();
+    Ok(FramePlan::new(PlanParts { field, rays, domain, sampling, transfer, dark, drawing })?)
 }
 
 /// An index cell of each brick, the farthest brick first.
 fn from_back_to_front(tree: &BrickTree, scene: &Scene, bricks: &[BrickId]) -> Vec<UVec3> {
     let order = back_to_front(tree.layout(), tree.grid(), &scene.camera, bricks);
     order.into_iter().map(|i| bricks[i].coords << u32::from(bricks[i].level.0)).collect()
-}
-
-fn check_technique(scene: &Scene) -> Result<(), PrepareError> {
-    match (scene.technique, scene.placement, scene.division) {
-        (Technique::RayCasting, ..) => Ok(()),
-        (_, Placement::Shells, _) => Err(PrepareError::RoundPolygons),
-        (_, _, Division::Ray) => Err(PrepareError::PolygonsOfRays),
-        (_, _, Division::Brick) => Ok(()),
-    }
 }
 
 fn check_facets(rays: &RayFrame) -> Result<(), PrepareError> {
@@ -257,22 +235,35 @@ fn clipped_domain(tree: &BrickTree, clip: Option<Aabb>) -> Result<Aabb, PrepareE
     Ok(if domain.is_empty() { Aabb { min: domain.min, max: domain.min } } else { domain })
 }
 
-/// The bricks that the frame needs, in their slots.
-fn resident_bricks(tree: &BrickTree, scene: &Scene, selection: &Selection, domain: &Aabb) -> Vec<BrickId> {
+/// The bricks that the frame needs.
+fn resident_bricks(
+    tree: &BrickTree,
+    scene: &Scene,
+    selection: &Selection,
+    domain: &Aabb,
+    residency: &mut Residency,
+) -> Vec<BrickId> {
     if scene.skipping == Skipping::Off {
         return selection.drawn().collect();
     }
-    let reach = match (scene.rule, scene.division) {
-        (QuadratureRule::PreIntegrated, Division::Ray) => segment_reach(tree, scene),
-        _ => 0,
-    };
-    let visibility = Visibility::of(tree, &scene.transfer, selection.cut().bricks(), reach);
+    let mut is_seen = |id: BrickId| !residency.is_transparent(tree, &scene.transfer, id);
     let in_domain = |id: &BrickId| !to_sample_space(tree.layout().index_box(*id)).intersection(domain).is_empty();
-    selection.drawn().filter(|id| in_domain(id) && visibility.needs(*id)).collect()
+    let drawn = selection.drawn().filter(in_domain);
+    match segment_reach(tree, scene) {
+        0 => drawn.filter(|id| is_seen(*id)).collect(),
+        reach => {
+            let seen = selection.cut().bricks().iter().copied().filter(|id| is_seen(*id));
+            let visibility = Visibility::around(*tree.layout(), seen, reach);
+            drawn.filter(|id| visibility.needs(*id)).collect()
+        }
+    }
 }
 
-/// How many bricks of level 0 a segment can span along an axis.
+/// How many bricks of level 0 a segment can span along an axis whose light depends on both its ends.
 fn segment_reach(tree: &BrickTree, scene: &Scene) -> u32 {
+    if scene.rule != QuadratureRule::PreIntegrated || scene.division == Division::Brick {
+        return 0;
+    }
     let spacing = tree.grid().spacing();
     // A sheared direction matrix can make a world step longer in voxels than the spacing says: take the map's own norm.
     let turn = tree.grid().world_to_index().matrix3;
@@ -280,66 +271,6 @@ fn segment_reach(tree: &BrickTree, scene: &Scene) -> u32 {
         [turn.x_axis, turn.y_axis, turn.z_axis].into_iter().map(DVec3::length_squared).sum::<f64>().sqrt();
     let voxels = scene.step_voxels * spacing.min_element() * voxels_per_unit;
     (voxels / f64::from(tree.layout().side().n_cells())).ceil().min(f64::from(u32::MAX)) as u32
-}
-
-fn index_grid(tree: &BrickTree, resident: &[BrickId]) -> IndexGrid {
-    let mut index = IndexGrid::transparent(tree.layout().n_bricks(Level(0)));
-    for (slot, id) in resident.iter().enumerate() {
-        let entry = IndexEntry::Resident { slot: slot as u32, level: id.level };
-        index.fill(id.coords << u32::from(id.level.0), entry);
-    }
-    merge_transparent(&mut index);
-    index
-}
-
-/// Lets aligned blocks that are wholly transparent answer as one, so that rays cross them in one jump.
-fn merge_transparent(index: &mut IndexGrid) {
-    let mut level = Level(0);
-    while level.stride() < index.dims().max_element() {
-        let coarser = Level(level.0 + 1);
-        for low in block_corners(index.dims(), coarser) {
-            let children = block_corners_within(index.dims(), low, coarser, level);
-            if children.into_iter().all(|c| index.at(c) == IndexEntry::Transparent { level }) {
-                index.fill(low, IndexEntry::Transparent { level: coarser });
-            }
-        }
-        level = coarser;
-    }
-}
-
-fn block_corners(dims: UVec3, level: Level) -> Vec<UVec3> {
-    block_corners_in(UVec3::ZERO, dims, level)
-}
-
-fn block_corners_within(dims: UVec3, low: UVec3, block: Level, level: Level) -> Vec<UVec3> {
-    block_corners_in(low, dims.min(low + block.stride()), level)
-}
-
-fn block_corners_in(low: UVec3, high: UVec3, level: Level) -> Vec<UVec3> {
-    let steps = |a: u32, b: u32| (a..b).step_by(level.stride() as usize);
-    let rows = steps(low.z, high.z).flat_map(|z| steps(low.y, high.y).map(move |y| (y, z)));
-    rows.flat_map(|(y, z)| steps(low.x, high.x).map(move |x| UVec3::new(x, y, z))).collect()
-}
-
-fn visible_box(tree: &BrickTree, resident: &[BrickId], domain: &Aabb) -> Aabb {
-    let empty = Aabb { min: domain.min, max: domain.min };
-    let boxes = resident.iter().map(|id| to_sample_space(tree.layout().index_box(*id)));
-    let visible = boxes.reduce(|a, b| a.union(&b)).map_or(empty, |b| b.intersection(domain));
-    if visible.is_empty() { empty } else { visible }
-}
-
-fn features(plan: &FramePlan, levels_differ: bool) -> FeatureSet {
-    let fast = matches!(plan.sampling.mode(), Mode::Fast { .. });
-    let needed = [
-        (Feature::HardwareFilter, fast),
-        (Feature::EarlyTermination, plan.sampling.transmittance_floor() > 0.0),
-        (Feature::SkipTransparent, plan.index.has_transparent()),
-        (Feature::SkipMacrocells, plan.occupancy.is_some()),
-        (Feature::SkipBesideBeams, plan.beams.is_some()),
-        (Feature::MultiLevel, levels_differ),
-        (Feature::TransferLookup, plan.transfer.knots().len() > 1),
-    ];
-    needed.into_iter().filter(|(_, need)| *need).map(|(feature, _)| feature).collect()
 }
 
 #[cfg(test)]
@@ -414,25 +345,97 @@ mod tests {
             let clip = Aabb { min: DVec3::new(clip[0], 0.0, 0.0), max: DVec3::new(clip[1], 31.0, 31.0) };
             Scene { clip: Some(clip), ..Scene::new(camera, UVec2::new(4, 4), transfer) }
         };
-        // As many other bricks; the same bricks with as many other knots; both back again.
+        // As many other bricks; the same bricks with as many other knots; both back again; and some of them.
         let scenes = [
             visible([1.0, 9.0], [0.0, 30.0]),
             visible([1.0, 9.0], [31.0, 61.0]),
             visible([3.0, 9.0], [31.0, 61.0]),
             visible([5.0, 9.0], [31.0, 61.0]),
             visible([1.0, 9.0], [0.0, 30.0]),
+            visible([1.0, 9.0], [0.0, 61.0]),
+            visible([1.0, 9.0], [0.0, 61.0]),
+            visible([1.0, 9.0], [0.0, 10.0]),
         ];
         let mut kept = Residency::default();
-        let of = |scene, residency: &mut Residency| {
-            let plan = prepare(&tree, scene, residency).unwrap();
-            (plan.bricks, plan.occupancy, plan.index, plan.beams, residency.bricks().to_vec())
+        let fresh = |scene: &Scene| {
+            let mut residency = Residency::default();
+            (prepare(&tree, scene, &mut residency).unwrap(), residency)
         };
-        let fresh: Vec<_> = scenes.iter().map(|scene| of(scene, &mut Residency::default())).collect();
-        assert!(fresh[0].0.n_bricks() == fresh[1].0.n_bricks() && fresh[0].0 != fresh[1].0);
-        assert!(fresh[1].4 == fresh[2].4 && fresh[1].1 != fresh[2].1);
-        for (scene, fresh) in scenes.iter().zip(&fresh) {
-            assert_eq!(of(scene, &mut kept), *fresh);
+        let all: Vec<_> = scenes.iter().map(fresh).collect();
+        let n_filled = |i: usize| all[i].0.field().slots().n_filled();
+        assert!(n_filled(0) == n_filled(1) && all[0].0.field() != all[1].0.field());
+        assert!(all[1].1.bricks() == all[2].1.bricks() && all[1].0.occupancy() != all[2].0.occupancy());
+        for (scene, (plan, residency)) in scenes.iter().zip(&all) {
+            let got = prepare(&tree, scene, &mut kept).unwrap();
+            assert_eq!(kept.bricks(), residency.bricks());
+            assert_same_frame(&got, plan);
         }
+    }
+
+    /// Whichever slots the bricks are in.
+    fn assert_same_frame(a: &FramePlan, b: &FramePlan) {
+        assert_eq!((a.visible(), a.beams(), a.features()), (b.visible(), b.beams(), b.features()));
+        let dims = a.field().index().dims();
+        assert_eq!(dims, b.field().index().dims());
+        let cells =
+            (0..dims.element_product()).map(|i| UVec3::new(i % dims.x, i / dims.x % dims.y, i / dims.x / dims.y));
+        for cell in cells {
+            let entries = [a, b].map(|plan| plan.field().index().at(cell));
+            assert_eq!(entries[0].reach(), entries[1].reach());
+            let of = |plan: &FramePlan, entry: IndexEntry| {
+                let slot = entry.slot()?;
+                let distances = plan.occupancy().map(|occupancy| occupancy.brick(slot).to_vec());
+                Some((plan.field().slots().samples(slot)?.bytes().to_vec(), distances))
+            };
+            assert_eq!(of(a, entries[0]), of(b, entries[1]));
+        }
+    }
+
+    /// A ramp of 4 x 1 x 1 bricks of 16, of which a clip box shows some; and the ramp's opposite, as another time step.
+    fn time_steps() -> ([BrickTree; 2], impl Fn(f64) -> Scene) {
+        let grid = Grid::axis_aligned(UVec3::new(61, 16, 16), DVec3::ONE).unwrap();
+        let tree = |value: fn(usize) -> u8| {
+            let values: Vec<u8> = (0..grid.n_voxels()).map(value).collect();
+            let options = BuildOptions { side: BrickSide::S16, ..BuildOptions::default() };
+            build_tree(&Volume::new(grid, values).unwrap(), &options).unwrap()
+        };
+        let trees = [tree(|i| (i % 61) as u8), tree(|i| 61 - (i % 61) as u8)];
+        let camera = Camera::framing(&grid.world_box(), DVec3::new(0.3, 1.0, 0.2), DVec3::Z).unwrap();
+        let scene = move |far: f64| {
+            let fog = TransferFunction::constant(0.1, [1.0; 3]).unwrap();
+            let clip = Aabb { min: DVec3::ZERO, max: DVec3::new(far, 16.0, 16.0) };
+            Scene { clip: Some(clip), ..Scene::new(camera, UVec2::new(4, 4), fog) }
+        };
+        (trees, scene)
+    }
+
+    #[test]
+    fn time_steps_that_share_a_residency_are_drawn_with_their_own_data() {
+        let ([first, second], scene) = time_steps();
+        let mut residency = Residency::default();
+        let mut plan = |tree| prepare(tree, &scene(61.0), &mut residency).unwrap();
+        let (a, b) = (plan(&first), plan(&second));
+        assert_same_frame(&b, &prepare(&second, &scene(61.0), &mut Residency::default()).unwrap());
+        assert_ne!(a.field().slots().samples(0), b.field().slots().samples(0));
+    }
+
+    #[test]
+    fn a_scene_that_is_drawn_again_costs_nothing_and_a_brick_more_costs_one() {
+        use brickfield_frame::Chunked;
+        let ([tree, _], scene) = time_steps();
+        let mut residency = Residency::default();
+        let mut plan = |far: f64| {
+            let plan = prepare(&tree, &scene(far), &mut residency).unwrap();
+            (plan, residency.copied().n_bricks)
+        };
+        let ((two, copied_two), (again, copied_again)) = (plan(20.0), plan(20.0));
+        assert_eq!((copied_two, copied_again), (2, 0));
+        assert!(two.field().index().id() == again.field().index().id());
+        assert!(two.field().slots().id() == again.field().slots().id());
+        let (three, copied) = plan(40.0);
+        assert_eq!((three.field().slots().n_filled(), copied), (3, 1));
+        let chunk = |plan: &FramePlan, slot: u32| plan.field().slots().samples(slot).unwrap().id();
+        assert!((0..2).all(|slot| chunk(&two, slot) == chunk(&three, slot)));
     }
 
     #[test]
@@ -465,11 +468,14 @@ mod tests {
             let technique = Technique::Polygons(brickfield_frame::Target::Float32);
             let scene = Scene::new(camera, UVec2::new(4, 4), fog.clone());
             let scene = Scene { step_voxels, placement, division, technique, ..scene };
-            prepare(&tree, &scene, &mut Residency::default()).map(|plan| plan.proxy.is_some())
+            prepare(&tree, &scene, &mut Residency::default()).map(|plan| plan.proxy().is_some())
         };
         assert_eq!(plan(1.0, Placement::ObjectPlanes, Division::Brick), Ok(true));
-        assert_eq!(plan(1.0, Placement::Shells, Division::Brick), Err(PrepareError::RoundPolygons));
-        assert_eq!(plan(1.0, Placement::ObjectPlanes, Division::Ray), Err(PrepareError::PolygonsOfRays));
+        assert_eq!(plan(1.0, Placement::Shells, Division::Brick), Err(PrepareError::Plan(PlanError::RoundPolygons)));
+        assert_eq!(
+            plan(1.0, Placement::ObjectPlanes, Division::Ray),
+            Err(PrepareError::Plan(PlanError::PolygonsOfRays))
+        );
         let many = plan(1e-5, Placement::ObjectPlanes, Division::Brick);
         assert!(matches!(many, Err(PrepareError::TooManyPolygons { .. })), "{many:?}");
         let scene = Scene::new(camera, UVec2::new(4096, 2048), fog.clone());

@@ -1,98 +1,235 @@
-//! The bricks that a backend holds, kept from frame to frame.
+//! The bricks that frames share, kept from frame to frame.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
-use brickfield_bricks::{BrickSamples, BrickTree, with_brick_samples};
-use brickfield_core::{BrickId, Scalar, ScalarType, TransferFunction};
-use brickfield_frame::{BrickSet, Decode, IndexGrid, MacrocellRanges, Occupancy, Overview};
+use brickfield_bricks::{BrickSamples, BrickTree, TreeId, with_brick_samples};
+use brickfield_core::glam::UVec3;
+use brickfield_core::{BrickId, Level, Scalar, ScalarType, TransferFunction};
+use brickfield_frame::{
+    Chunk, DarkRegions, Decode, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, MacrocellRanges,
+    Occupancy, Places, Reach, SampleFormat, Slots,
+};
 use rayon::prelude::*;
 
-/// The brick set of the last frame. A frame that needs the same bricks gets the same set, and backends upload nothing.
-#[derive(Clone, Debug, Default)]
+use crate::Scene;
+
+/// The bricks of the last frame, in their slots, and all that was found out about them.
+///
+/// A frame that needs a brick more copies one brick; a scene that is drawn again costs nothing. One residency serves one tree at a
+/// time: handed another, it begins anew.
+#[derive(Debug, Default)]
 pub struct Residency {
-    bricks: Vec<BrickId>,
-    set: Option<Arc<BrickSet>>,
-    /// Of the set, once a frame asked for it.
-    ranges: Option<MacrocellRanges>,
-    occupancy: Option<(TransferFunction, Option<Arc<Occupancy>>)>,
-    overview: Option<LastOverview>,
+    tree: Option<TreeId>,
+    last: Option<(Scene, FramePlan)>,
+    table: SlotTable,
+    field: Option<Field>,
+    dark: Option<DarkRegions>,
+    transparent: Transparent,
+    copied: Copied,
 }
 
-/// The overview of the last frame, and what it is of.
-#[derive(Clone, Debug)]
-struct LastOverview {
-    index: IndexGrid,
-    occupancy: Option<Arc<Occupancy>>,
-    overview: Option<Arc<Overview>>,
+/// What a frame copied from the tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub struct Copied {
+    pub n_bricks: usize,
+    pub n_bytes: usize,
+}
+
+/// Which brick is in which slot.
+#[derive(Debug, Default)]
+struct SlotTable {
+    /// The bricks of the last frame, in the order of its cut.
+    bricks: Vec<BrickId>,
+    slot_of: HashMap<BrickId, u32>,
+    /// Slot by slot; none of them in a free one.
+    samples: Vec<Option<Arc<Chunk>>>,
+    ranges: Vec<Option<Arc<MacrocellRanges>>>,
+    /// For the transfer function that they were made for.
+    distances: Vec<Option<Arc<Chunk>>>,
+    of: Option<TransferFunction>,
+}
+
+/// Which bricks of a tree a transfer function makes transparent: level by level, as far as anybody asked.
+#[derive(Debug, Default)]
+struct Transparent {
+    of: Option<TransferFunction>,
+    levels: HashMap<Level, Vec<bool>>,
 }
 
 impl Residency {
-    /// The bricks in their slots.
+    /// The bricks of the last frame.
     pub fn bricks(&self) -> &[BrickId] {
-        &self.bricks
+        &self.table.bricks
     }
 
-    /// A set of exactly `bricks`, in this order: the last one if it fits. One residency serves one tree.
-    pub(crate) fn hold(&mut self, tree: &BrickTree, bricks: Vec<BrickId>) -> Arc<BrickSet> {
-        match &self.set {
-            Some(set) if self.bricks == bricks => Arc::clone(set),
-            _ => {
-                let set = Arc::new(gather(tree, &bricks));
-                *self =
-                    Residency { bricks, set: Some(Arc::clone(&set)), ranges: None, occupancy: None, overview: None };
-                set
-            }
+    /// What the last frame copied.
+    pub fn copied(&self) -> Copied {
+        self.copied
+    }
+
+    /// Begins anew if the tree is another.
+    pub(crate) fn serve(&mut self, tree: &BrickTree) {
+        if self.tree != Some(tree.id()) {
+            *self = Residency { tree: Some(tree.id()), ..Residency::default() };
         }
+        self.copied = Copied::default();
     }
 
-    /// What a transfer function shows of the held set; `None` if it shows something of every macrocell, or the set is too
-    /// large for a map.
-    pub(crate) fn occupancy(&mut self, transfer: &TransferFunction) -> Option<Arc<Occupancy>> {
-        match &self.occupancy {
-            Some((of, occupancy)) if of == transfer => occupancy.clone(),
-            _ => {
-                let set = self.set.as_deref().filter(|set| Occupancy::fits(set.side(), set.n_bricks()))?;
-                let occupancy = self.ranges.get_or_insert_with(|| MacrocellRanges::of(set)).occupancy(transfer);
-                self.occupancy = Some((transfer.clone(), occupancy.clone()));
-                occupancy
-            }
+    /// The plan of a scene, if it is the last one's.
+    pub(crate) fn plan_of(&self, scene: &Scene) -> Option<FramePlan> {
+        self.last.as_ref().filter(|(last, _)| last == scene).map(|(_, plan)| plan.clone())
+    }
+
+    /// Remembers a scene's plan.
+    pub(crate) fn remember(&mut self, scene: &Scene, plan: &FramePlan) {
+        self.last = Some((scene.clone(), plan.clone()));
+    }
+
+    /// Whether a transfer function makes a brick transparent.
+    pub(crate) fn is_transparent(&mut self, tree: &BrickTree, transfer: &TransferFunction, id: BrickId) -> bool {
+        self.transparent.level(tree, transfer, id.level)[tree.layout().ordinal(id)]
+    }
+
+    /// The field of `bricks`: the last one, if it has the same; else the bricks that are new are copied.
+    pub(crate) fn hold(&mut self, tree: &BrickTree, bricks: Vec<BrickId>) -> Field {
+        self.last = None;
+        if let Some(field) = self.field.as_ref().filter(|_| self.table.bricks == bricks) {
+            return field.clone();
         }
-    }
-
-    /// The overview of an index of the held set; `None` if nothing in it is known to be dark.
-    pub(crate) fn overview(&mut self, index: &IndexGrid, occupancy: Option<&Arc<Occupancy>>) -> Option<Arc<Overview>> {
-        let address = |o: &Arc<Occupancy>| Arc::as_ptr(o);
-        let is_of = |last: &LastOverview| {
-            last.occupancy.as_ref().map(address) == occupancy.map(address) && last.index == *index
+        let range = tree.summary(tree.layout().root()).range;
+        let (format, decode) = SampleFormat::encoding(tree.scalar_type(), range);
+        self.copied = self.table.hold(bricks, |id| gather(tree, id, format, decode));
+        let side = tree.layout().side();
+        let slots = Slots::new(format, decode, Places::Even(side), self.table.samples.clone());
+        let index = self.table.index(tree);
+        let index = match &self.field {
+            Some(before) => index.following(before.index()),
+            None => index,
         };
-        match &self.overview {
-            Some(last) if is_of(last) => last.overview.clone(),
-            _ => {
-                let side = self.set.as_ref()?.side();
-                let overview = Overview::of(side, index, occupancy.map(Arc::as_ref)).map(Arc::new);
-                let (index, occupancy) = (index.clone(), occupancy.cloned());
-                self.overview = Some(LastOverview { index, occupancy, overview: overview.clone() });
-                overview
-            }
+        let field = Field::new(
+            tree.layout().dims(),
+            Arc::new(index),
+            Arc::new(slots.expect("bricks fill their slots")),
+            Join::Shared,
+        );
+        let field = field.expect("an index of the bricks that are in slots");
+        self.field = Some(field.clone());
+        field
+    }
+
+    /// The regions of the held field that a transfer function makes dark.
+    pub(crate) fn dark(&mut self, transfer: &TransferFunction) -> DarkRegions {
+        let Some(field) = &self.field else { return DarkRegions::default() };
+        let is_known = self.table.of.as_ref() == Some(transfer);
+        if let Some(dark) = self.dark.as_ref().filter(|dark| is_known && dark.is_of(field)) {
+            return dark.clone();
         }
+        let occupancy = self.table.occupancy(field.slots(), transfer);
+        let dark = DarkRegions::new(field, occupancy).expect("distances of the field's own bricks");
+        self.dark = Some(dark.clone());
+        dark
     }
 }
 
-fn gather(tree: &BrickTree, bricks: &[BrickId]) -> BrickSet {
-    let side = tree.layout().side();
-    let scalar = tree.scalar_type();
-    let range = tree.summary(tree.layout().root()).range;
-    let (format, decode) = BrickSet::encoding(scalar, range);
-    let brick_bytes = side.n_samples_total() * format.n_bytes();
-    let mut bytes = vec![0; brick_bytes * bricks.len()];
-    bytes
-        .par_chunks_exact_mut(brick_bytes)
-        .zip(bricks)
-        .for_each(|(out, id)| encode(tree.samples(*id), scalar, decode, out));
-    BrickSet::new(side, format, decode, bytes).expect("whole bricks by construction")
+impl SlotTable {
+    /// Gives each of `bricks` a slot, and drops all others. Bricks that were there keep theirs, unless most slots are free.
+    fn hold(&mut self, bricks: Vec<BrickId>, gather: impl Fn(BrickId) -> Chunk + Sync) -> Copied {
+        let mut kept: HashMap<BrickId, u32> = HashMap::with_capacity(bricks.len());
+        kept.extend(bricks.iter().filter_map(|id| Some((*id, *self.slot_of.get(id)?))));
+        if 2 * bricks.len() < self.samples.len() {
+            self.pack(&bricks);
+        } else {
+            let before = std::mem::replace(&mut self.slot_of, kept);
+            for (_, slot) in before.iter().filter(|(id, _)| !self.slot_of.contains_key(*id)) {
+                self.samples[*slot as usize] = None;
+                self.ranges[*slot as usize] = None;
+                self.distances[*slot as usize] = None;
+            }
+        }
+        let mut free = (0..self.samples.len()).filter(|slot| self.samples[*slot].is_none()).collect::<Vec<_>>();
+        free.reverse();
+        let (mut new, mut n_slots) = (Vec::new(), self.samples.len());
+        for id in bricks.iter().filter(|id| !self.slot_of.contains_key(id)) {
+            let slot = free.pop().unwrap_or_else(|| {
+                n_slots += 1;
+                n_slots - 1
+            });
+            new.push((*id, slot));
+        }
+        self.slot_of.extend(new.iter().map(|(id, slot)| (*id, *slot as u32)));
+        self.samples.resize(n_slots, None);
+        self.ranges.resize(n_slots, None);
+        self.distances.resize(n_slots, None);
+        let chunks: Vec<Arc<Chunk>> = new.par_iter().map(|(id, _)| Arc::new(gather(*id))).collect();
+        let n_bytes = chunks.iter().map(|chunk| chunk.bytes().len()).sum();
+        for ((_, slot), chunk) in new.iter().zip(chunks) {
+            self.samples[*slot] = Some(chunk);
+        }
+        self.bricks = bricks;
+        Copied { n_bricks: new.len(), n_bytes }
+    }
+
+    /// Moves those of `bricks` that are there to the first slots, in their order.
+    fn pack(&mut self, bricks: &[BrickId]) {
+        let there: Vec<(BrickId, usize)> =
+            bricks.iter().filter_map(|id| Some((*id, *self.slot_of.get(id)? as usize))).collect();
+        fn of<T: Clone>(list: &[Option<T>], there: &[(BrickId, usize)]) -> Vec<Option<T>> {
+            there.iter().map(|(_, slot)| list[*slot].clone()).collect()
+        }
+        self.samples = of(&self.samples, &there);
+        self.ranges = of(&self.ranges, &there);
+        self.distances = of(&self.distances, &there);
+        self.slot_of = there.iter().enumerate().map(|(slot, (id, _))| (*id, slot as u32)).collect();
+    }
+
+    fn index(&self, tree: &BrickTree) -> IndexGrid {
+        let layout = tree.layout();
+        let entry = |id: &BrickId| {
+            let cell: UVec3 = id.coords << u32::from(id.level.0);
+            (cell, IndexEntry::Resident { slot: self.slot_of[id], reach: Reach::of_brick(id.level) })
+        };
+        let lattice = IndexLattice { cell_samples: layout.side().n_cells(), origin: 0.0 };
+        IndexGrid::new(layout.n_bricks(Level(0)), lattice, self.bricks.iter().map(entry))
+    }
+
+    /// What a transfer function shows of the macrocells; `None` if it shows something of all, or if they are too many for a map.
+    fn occupancy(&mut self, slots: &Slots, transfer: &TransferFunction) -> Option<Arc<Occupancy>> {
+        let side = slots.brick_side().filter(|side| Occupancy::fits(*side, slots.n_slots()))?;
+        if self.of.as_ref() != Some(transfer) {
+            self.distances.fill(None);
+            self.of = Some(transfer.clone());
+        }
+        let (format, decode) = (slots.format(), slots.decode());
+        let lists = self.samples.par_iter().zip(&mut self.ranges).zip(&mut self.distances);
+        lists.for_each(|((samples, ranges), distances)| {
+            let Some(samples) = samples else { return };
+            let ranges = ranges.get_or_insert_with(|| Arc::new(MacrocellRanges::of(side, format, samples.bytes())));
+            distances.get_or_insert_with(|| Arc::new(ranges.distances(decode, transfer)));
+        });
+        Occupancy::new(side, self.distances.clone())
+    }
 }
 
-/// Native samples to the stored form of [`BrickSet::encoding`].
+impl Transparent {
+    fn level(&mut self, tree: &BrickTree, transfer: &TransferFunction, level: Level) -> &[bool] {
+        if self.of.as_ref() != Some(transfer) {
+            *self = Transparent { of: Some(transfer.clone()), levels: HashMap::new() };
+        }
+        let summaries = || tree.summaries(level).par_iter();
+        let of_level = || summaries().map(|summary| transfer.is_transparent(summary.range)).collect();
+        self.levels.entry(level).or_insert_with(of_level)
+    }
+}
+
+/// A brick's samples in the stored form of [`SampleFormat::encoding`].
+fn gather(tree: &BrickTree, id: BrickId, format: SampleFormat, decode: Decode) -> Chunk {
+    let mut bytes = vec![0; tree.layout().side().n_samples_total() * format.n_bytes()];
+    encode(tree.samples(id), tree.scalar_type(), decode, &mut bytes);
+    Chunk::new(bytes)
+}
+
 fn encode(samples: BrickSamples<'_>, scalar: ScalarType, decode: Decode, out: &mut [u8]) {
     match scalar {
         ScalarType::U8 | ScalarType::U16 => samples.copy_le_bytes(out),

@@ -1,8 +1,7 @@
-//! Which bricks a transfer function lets show.
+//! Which bricks contribute where a segment may end in a brick beside them.
 
-use brickfield_bricks::BrickTree;
 use brickfield_core::glam::UVec3;
-use brickfield_core::{BrickId, BrickLayout, Level, TransferFunction};
+use brickfield_core::{BrickId, BrickLayout, Level};
 
 /// Which bricks of a cut contribute, on the grid of level-0 bricks.
 pub(crate) struct Visibility {
@@ -11,13 +10,12 @@ pub(crate) struct Visibility {
 }
 
 impl Visibility {
-    /// The bricks whose range the transfer function does not make transparent, and their neighbours within `reach` level-0
-    /// bricks (rules whose segments span two nodes need the data at both).
-    pub(crate) fn of(tree: &BrickTree, transfer: &TransferFunction, cut: &[BrickId], reach: u32) -> Visibility {
-        let layout = *tree.layout();
+    /// Those bricks of a cut, all others being transparent, and their neighbours within `reach` level-0 bricks (rules whose
+    /// segments span two nodes need the data at both).
+    pub(crate) fn around(layout: BrickLayout, visible: impl Iterator<Item = BrickId>, reach: u32) -> Visibility {
         let mut visibility = Visibility { layout, cells: vec![false; layout.n_bricks_total(Level(0))] };
-        for id in cut.iter().filter(|id| !transfer.is_transparent(tree.summary(**id).range)) {
-            let (low, high) = visibility.block(*id);
+        for id in visible {
+            let (low, high) = visibility.block(id);
             visibility.mark(low.saturating_sub(UVec3::splat(reach)), high.saturating_add(UVec3::splat(reach)));
         }
         visibility

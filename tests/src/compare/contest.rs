@@ -104,7 +104,7 @@ impl Contest<'_> {
     fn first_frame(&mut self, point: usize, rival: usize) -> Result<Result<Entry, String>, OutputError> {
         let (begin, c) = (Instant::now(), &self.points[point]);
         let backend = &mut self.rivals.present[rival];
-        let Frame { image, timing } = match backend.render(&c.plan) {
+        let Frame { image, timing, .. } = match backend.render(&c.plan) {
             Ok(frame) => frame,
             Err(e) => return Ok(Err(e.to_string())),
         };

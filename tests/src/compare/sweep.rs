@@ -88,15 +88,15 @@ fn steps(args: &CompareArgs, rule: QuadratureRule, mode: Mode) -> Vec<f64> {
 
 /// Nodes of all segments in the domain, over all rays: what is evaluated without skipping.
 fn count_samples(plan: &FramePlan) -> u64 {
-    let (size, h) = (plan.size(), plan.sampling.step_world());
+    let (size, h) = (plan.size(), plan.sampling().step_world());
     let n_segments = |x: u32, y: u32| {
-        let r = plan.rays.ray(x, y);
+        let r = plan.rays().ray(x, y);
         // The ray from the frame's start on; the domain's box, like the anchor, relative to the frame's centre.
-        let ray = Ray { origin: plan.rays.center + r.at(0.0), direction: r.direction };
-        ray.clip(&plan.domain).map_or(0, |s| ((s.end / h).ceil() - (s.start / h).floor()) as u64)
+        let ray = Ray { origin: plan.rays().center + r.at(0.0), direction: r.direction };
+        ray.clip(plan.domain()).map_or(0, |s| ((s.end / h).ceil() - (s.start / h).floor()) as u64)
     };
     let total: u64 = (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y))).map(|(x, y)| n_segments(x, y)).sum();
-    total * plan.sampling.rule().nodes().len() as u64
+    total * plan.sampling().rule().nodes().len() as u64
 }
 
 #[cfg(test)]
@@ -133,7 +133,7 @@ mod tests {
         assert!(points.iter().take_while(first).all(|c| c.rule == QuadratureRule::Gauss2 && c.mode == Mode::Exact));
         assert_eq!(points.iter().filter(first).count(), HIGH_ORDER.len());
         let sets: std::collections::HashSet<_> =
-            points.iter().map(|c| std::sync::Arc::as_ptr(&c.plan.bricks)).collect();
+            points.iter().map(|c| std::sync::Arc::as_ptr(c.plan.field().slots())).collect();
         assert_eq!(sets.len(), 5);
     }
 

@@ -71,7 +71,11 @@ impl Candidate {
         function: ShaderFunction,
         inputs: &[[f32; 4]],
     ) -> Option<Result<Vec<[f32; 4]>, RenderError>> {
-        self.opened.as_mut().ok().map(|b| b.evaluate(plan, function, inputs))
+        let backend = self.opened.as_mut().ok()?;
+        Some(match backend.as_evaluate() {
+            Some(evaluates) => evaluates.evaluate(plan, function, inputs),
+            None => Err(RenderError::Unsupported { what: "evaluate single functions" }),
+        })
     }
 
     /// Whether the backend compiles shaders, so that shader mutants reach it.

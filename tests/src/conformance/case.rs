@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 use std::fmt;
-use std::sync::Arc;
 
 use brickfield::bricks::BrickTree;
 use brickfield::frame::{FramePlan, ShaderFunction};
@@ -126,7 +125,7 @@ impl PictureTest {
         let complete = Scene { skipping: Skipping::Off, technique, ..self.scene.clone() };
         let mut replayed = prepare(&self.tree, &self.scene, &mut Residency::default())?;
         if let Some(n) = self.triangles_at_a_time {
-            replayed.proxy = replayed.proxy.map(|proxy| Arc::new(Arc::unwrap_or_clone(proxy).in_batches_of(n)));
+            replayed = replayed.in_batches_of(n);
         }
         Ok(Plans { replayed, complete: prepare(&self.tree, &complete, &mut Residency::default())? })
     }

@@ -127,7 +127,7 @@ impl Prepared {
         match &self.work {
             Work::Picture(picture) => {
                 let (scene, plan) = (&picture.subject.scene, &picture.plans.replayed);
-                let (n, size) = (plan.bricks.n_bricks(), scene.size);
+                let (n, size) = (plan.field().slots().n_filled(), scene.size);
                 format!("{} x {} pixels, {n} bricks, {}, {}", size.x, size.y, scene.rule.name(), scene.mode.name())
             }
             Work::Function(test) => format!("{} inputs", test.points.len()),
@@ -183,7 +183,7 @@ fn stored_rounding(subject: &PictureTest) -> f64 {
 impl PreparedPicture {
     /// The property of a device on which the tolerance depends: in fast mode the bits of its filter weights.
     fn device_key(&self, device: &Capabilities) -> Option<u32> {
-        matches!(self.plans.replayed.sampling.mode(), Mode::Fast { .. }).then_some(device.sub_texel_bits)
+        matches!(self.plans.replayed.sampling().mode(), Mode::Fast { .. }).then_some(device.sub_texel_bits)
     }
 
     /// Works out the tolerance on a device, unless it is known.

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use brickfield::frame::{
-    Beams, BrickSet, Decode, Feature, FramePlan, IndexEntry, Mode, Overview, ProxyCorner, ProxyGeometry, SampleFormat,
-    Sampling,
+    Chunk, Chunked, Decode, Feature, FramePlan, IndexEntry, IndexGrid, Mode, ProxyCorner, ProxyGeometry, Reach,
+    SampleFormat, Sampling, Slots, SpoiltPlan,
 };
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Aabb, Knot, Level, TransferFunction};
+use brickfield_core::{Aabb, Knot, TransferFunction};
 use brickfield_optics::QuadratureRule;
 
 /// One thing wrong with a plan.
@@ -35,7 +35,7 @@ pub enum PlanMutant {
     LastSegmentDropped,
     /// The visible box misses a slice of the volume's visible part.
     VisibleTooSmall,
-    /// A brick in the middle is marked transparent.
+    /// A brick in the middle is marked empty.
     BrickTransparent,
     /// Two bricks are swapped in the index.
     IndexSwapped,
@@ -69,7 +69,7 @@ pub enum PlanMutant {
     BehindTheEye,
     /// The clip box is ignored.
     ClipIgnored,
-    /// Transparent blocks show a brick of the greatest value.
+    /// Empty blocks show a brick of the greatest value.
     GhostBricks,
     /// Polygons are drawn front to back.
     PolygonsReversed,
@@ -170,15 +170,12 @@ impl PlanMutant {
 
     /// The plan with this thing wrong.
     pub fn apply(self, honest: &FramePlan) -> FramePlan {
-        let mut plan = honest.clone();
+        let mut plan = SpoiltPlan::of(honest);
         self.spoil(&mut plan);
-        if plan.beams.is_some() {
-            trace_beams(&mut plan);
-        }
-        plan
+        plan.into_plan()
     }
 
-    fn spoil(self, plan: &mut FramePlan) {
+    fn spoil(self, plan: &mut SpoiltPlan) {
         match self {
             PlanMutant::AnchorHalfVoxel => plan.rays.anchor[0].x += 0.5,
             PlanMutant::PixelCorner => shift_half_pixel(plan),
@@ -228,16 +225,7 @@ impl PlanMutant {
     }
 }
 
-/// Beams are traced anew: what is wrong shall be seen, not hidden by beams that know better.
-fn trace_beams(plan: &mut FramePlan) {
-    let overview = Overview::of(plan.bricks.side(), &plan.index, plan.occupancy.as_deref());
-    plan.beams = overview.and_then(|overview| Beams::of(plan, &overview)).map(Arc::new);
-    if plan.beams.is_none() {
-        plan.features = plan.features.without(Feature::SkipBesideBeams);
-    }
-}
-
-fn edit_triangles(plan: &mut FramePlan, edit: impl Fn(&[ProxyCorner], &mut [[u32; 3]])) {
+fn edit_triangles(plan: &mut SpoiltPlan, edit: impl Fn(&[ProxyCorner], &mut [[u32; 3]])) {
     let Some(proxy) = &mut plan.proxy else { return };
     let mut spoilt = ProxyGeometry::clone(proxy);
     let corners = spoilt.corners().to_vec();
@@ -245,63 +233,81 @@ fn edit_triangles(plan: &mut FramePlan, edit: impl Fn(&[ProxyCorner], &mut [[u32
     *proxy = Arc::new(spoilt);
 }
 
-fn drop_triangles(plan: &mut FramePlan, is_dropped: impl Fn(&ProxyCorner) -> bool) {
+fn drop_triangles(plan: &mut SpoiltPlan, is_dropped: impl Fn(&ProxyCorner) -> bool) {
     edit_triangles(plan, |corners, triangles| {
         let dropped = triangles.iter_mut().filter(|t| is_dropped(&corners[t[0] as usize]));
         dropped.for_each(|t| *t = [0; 3]);
     });
 }
 
-fn forget_batches(plan: &mut FramePlan) {
+fn forget_batches(plan: &mut SpoiltPlan) {
     let last = plan.proxy.as_ref().and_then(|proxy| proxy.batches().last().map(|batch| batch.start as usize / 3));
     edit_triangles(plan, |_, triangles| triangles[..last.unwrap_or(0)].fill([0; 3]));
 }
 
-fn shift_half_pixel(plan: &mut FramePlan) {
+fn shift_half_pixel(plan: &mut SpoiltPlan) {
     for v in [&mut plan.rays.anchor, &mut plan.rays.direction] {
         v[0] += 0.5 * (v[1] + v[2]);
     }
 }
 
-fn flip_rows(plan: &mut FramePlan) {
+fn flip_rows(plan: &mut SpoiltPlan) {
     plan.rays.anchor[2] *= -1.0;
     plan.rays.direction[2] *= -1.0;
 }
 
-fn make_parallel(plan: &mut FramePlan) {
+fn make_parallel(plan: &mut SpoiltPlan) {
     plan.rays.direction[1] = DVec3::ZERO;
     plan.rays.direction[2] = DVec3::ZERO;
     plan.rays.pixel = 0.0;
 }
 
 /// Lets rays begin a volume's length before the eye.
-fn see_behind(plan: &mut FramePlan) {
+fn see_behind(plan: &mut SpoiltPlan) {
     let step = plan.sampling.step_world();
     let length = plan.dims.as_dvec3().length() / plan.rays.direction[0].length();
     let back = (2.0 * length / step).ceil() * step;
     plan.rays.start += back;
 }
 
-fn whole(plan: &FramePlan) -> Aabb {
+fn whole(plan: &SpoiltPlan) -> Aabb {
     Aabb { min: DVec3::splat(-0.5), max: plan.dims.as_dvec3() - 0.5 }
 }
 
 /// One brick whose samples all have the greatest stored value, everywhere.
-fn show_ghosts(plan: &mut FramePlan) {
-    let bricks = &plan.bricks;
-    let sample: &[u8] = match bricks.format() {
+fn show_ghosts(plan: &mut SpoiltPlan) {
+    let sample: &[u8] = match plan.slots.format() {
         SampleFormat::Unorm8 | SampleFormat::Unorm16 => &[0xff],
         SampleFormat::Float32 => &[0, 0, 0x80, 0x3f],
     };
-    let bytes = sample.iter().copied().cycle().take(bricks.brick_bytes()).collect();
-    let ghost = BrickSet::new(bricks.side(), bricks.format(), bricks.decode(), bytes).expect("one brick");
-    plan.bricks = Arc::new(ghost);
-    let entry = IndexEntry::Resident { slot: 0, level: Level(0) };
-    plan.index.words_mut().fill(entry.pack());
+    let bytes: Vec<u8> = sample.iter().copied().cycle().take(plan.slots.chunk_bytes()).collect();
+    refill(plan, vec![Some(bytes)], plan.slots.decode());
+    let entry = IndexEntry::Resident { slot: 0, reach: Reach(0) };
+    edit_words(plan, |words| words.fill(entry.pack()));
     plan.visible = plan.domain;
 }
 
-fn resample(plan: &mut FramePlan, change: impl Fn(&Sampling) -> (f64, QuadratureRule, Mode)) {
+/// Other samples in the slots.
+fn refill(plan: &mut SpoiltPlan, bytes: Vec<Option<Vec<u8>>>, decode: Decode) {
+    let samples = bytes.into_iter().map(|bytes| Some(Arc::new(Chunk::new(bytes?)))).collect();
+    let slots = Slots::new(plan.slots.format(), decode, plan.slots.places().clone(), samples);
+    plan.slots = Arc::new(slots.expect("samples of the same size"));
+}
+
+/// Changed samples in the slots.
+fn edit_samples(plan: &mut SpoiltPlan, edit: impl Fn(&[u8]) -> Vec<u8>) {
+    let all = plan.slots.all_samples().iter();
+    let edited = all.map(|samples| samples.as_ref().map(|chunk| edit(chunk.bytes()))).collect();
+    refill(plan, edited, plan.slots.decode());
+}
+
+fn edit_words(plan: &mut SpoiltPlan, edit: impl FnOnce(&mut [u32])) {
+    let mut words = plan.index.words().to_vec();
+    edit(&mut words);
+    plan.index = Arc::new(IndexGrid::from_words(plan.index.dims(), plan.index.lattice(), words));
+}
+
+fn resample(plan: &mut SpoiltPlan, change: impl Fn(&Sampling) -> (f64, QuadratureRule, Mode)) {
     let (step, rule, mode) = change(&plan.sampling);
     let old = plan.sampling;
     let new = Sampling::new(step, rule, mode).expect("a mutant's sampling is a sampling");
@@ -309,118 +315,124 @@ fn resample(plan: &mut FramePlan, change: impl Fn(&Sampling) -> (f64, Quadrature
     plan.sampling = new.weighted(old.lengths()).unwrap_or(new);
 }
 
-fn end_domain_at_samples(plan: &mut FramePlan) {
-    let last = plan.last_sample();
+fn end_domain_at_samples(plan: &mut SpoiltPlan) {
+    let last = plan.field().last_sample();
     cut_domain(plan, Aabb { min: DVec3::ZERO, max: last });
 }
 
 /// Ends the domain one step of the central ray before its far end.
-fn drop_last_segment(plan: &mut FramePlan) {
+fn drop_last_segment(plan: &mut SpoiltPlan) {
     let way = plan.rays.direction[0] * plan.sampling.step_world();
     let Aabb { min, max } = plan.domain;
     let back = way.clamp(-0.5 * (max - min), 0.5 * (max - min));
     cut_domain(plan, Aabb { min: min - back.min(DVec3::ZERO), max: max - back.max(DVec3::ZERO) });
 }
 
-fn cut_domain(plan: &mut FramePlan, to: Aabb) {
+fn cut_domain(plan: &mut SpoiltPlan, to: Aabb) {
     plan.domain = plan.domain.intersection(&to);
     plan.visible = plan.visible.intersection(&to);
 }
 
-fn shrink_visible(plan: &mut FramePlan) {
+fn shrink_visible(plan: &mut SpoiltPlan) {
     let extent = plan.visible.extent();
     plan.visible.min += extent * 0.3;
     plan.visible.max -= extent * 0.3;
 }
 
-fn hide_central_brick(plan: &mut FramePlan) {
+fn hide_central_brick(plan: &mut SpoiltPlan) {
     let centre = plan.index.dims() / 2;
-    let level = plan.index.at(centre).level();
-    plan.index.fill(centre, IndexEntry::Transparent { level });
-    plan.features = plan.features.with(Feature::SkipTransparent);
+    let reach = plan.index.at(centre).reach();
+    let (low, high) = reach.block(centre);
+    let dims = plan.index.dims();
+    let in_block = |cell: UVec3| cell.cmpge(low).all() && cell.cmplt(high).all();
+    edit_words(plan, |words| {
+        let cells = (0..).map(|i| UVec3::new(i % dims.x, i / dims.x % dims.y, i / dims.x / dims.y));
+        let hidden = words.iter_mut().zip(cells).filter(|(_, cell)| in_block(*cell));
+        hidden.for_each(|(word, _)| *word = IndexEntry::Empty { reach }.pack());
+    });
+    plan.features = plan.features.with(Feature::SkipEmpty);
 }
 
 /// Gives each of the two central bricks the other's slot.
-fn swap_slots(plan: &mut FramePlan) {
-    let words = plan.index.words_mut();
-    let slot = |w: u32| match IndexEntry::unpack(w) {
-        IndexEntry::Resident { slot, .. } => Some(slot),
-        IndexEntry::Transparent { .. } => None,
-    };
-    let middle = words.len() / 2;
-    let mut near: Vec<u32> =
-        words[middle..].iter().chain(words[..middle].iter().rev()).filter_map(|w| slot(*w)).collect();
-    near.dedup();
-    let (Some(&a), Some(&b)) = (near.first(), near.iter().find(|s| Some(*s) != near.first())) else { return };
-    for word in words {
-        if let IndexEntry::Resident { slot, level } = IndexEntry::unpack(*word) {
-            let other = if slot == a {
-                b
-            } else if slot == b {
-                a
-            } else {
-                slot
-            };
-            *word = IndexEntry::Resident { slot: other, level }.pack();
+fn swap_slots(plan: &mut SpoiltPlan) {
+    edit_words(plan, |words| {
+        let slot = |w: u32| IndexEntry::unpack(w).slot();
+        let middle = words.len() / 2;
+        let mut near: Vec<u32> =
+            words[middle..].iter().chain(words[..middle].iter().rev()).filter_map(|w| slot(*w)).collect();
+        near.dedup();
+        let (Some(&a), Some(&b)) = (near.first(), near.iter().find(|s| Some(*s) != near.first())) else { return };
+        for word in words {
+            if let IndexEntry::Resident { slot, reach } = IndexEntry::unpack(*word) {
+                let other = if slot == a {
+                    b
+                } else if slot == b {
+                    a
+                } else {
+                    slot
+                };
+                *word = IndexEntry::Resident { slot: other, reach }.pack();
+            }
         }
-    }
+    });
 }
 
-fn confuse_levels(plan: &mut FramePlan) {
-    for word in plan.index.words_mut() {
-        if let IndexEntry::Resident { slot, level } = IndexEntry::unpack(*word) {
-            let level = if level == Level(0) { Level(1) } else { Level(0) };
-            *word = IndexEntry::Resident { slot, level }.pack();
+fn confuse_levels(plan: &mut SpoiltPlan) {
+    edit_words(plan, |words| {
+        for word in words {
+            if let IndexEntry::Resident { slot, reach } = IndexEntry::unpack(*word) {
+                let reach = if reach == Reach(0) { Reach(1) } else { Reach(0) };
+                *word = IndexEntry::Resident { slot, reach }.pack();
+            }
         }
-    }
+    });
     plan.features = plan.features.with(Feature::MultiLevel);
 }
 
 /// Every brick with the sample at `from(p, n)` at p.
-fn move_samples(plan: &mut FramePlan, from: impl Fn(UVec3, u32) -> UVec3) {
-    let (n, size) = (plan.bricks.side().n_samples(), plan.bricks.format().n_bytes());
-    let brick_bytes = plan.bricks.brick_bytes();
+fn move_samples(plan: &mut SpoiltPlan, from: impl Fn(UVec3, u32) -> UVec3) {
+    let n = plan.slots.brick_side().expect("cases have bricks of one size").n_samples();
+    let size = plan.slots.format().n_bytes();
     let at = |p: UVec3| size * (p.x + n * (p.y + n * p.z)) as usize;
-    let mut moved = (*plan.bricks).clone();
-    for (to, brick) in
-        moved.bytes_mut().chunks_exact_mut(brick_bytes).zip(plan.bricks.bytes().chunks_exact(brick_bytes))
-    {
+    edit_samples(plan, |brick| {
+        let mut moved = brick.to_vec();
         for i in 0..n * n * n {
             let p = UVec3::new(i % n, i / n % n, i / (n * n));
-            let source = at(from(p, n));
-            to[at(p)..][..size].copy_from_slice(&brick[source..][..size]);
+            moved[at(p)..][..size].copy_from_slice(&brick[at(from(p, n))..][..size]);
         }
-    }
-    plan.bricks = Arc::new(moved);
+        moved
+    });
 }
 
-fn edit_bytes(plan: &mut FramePlan, edit: impl Fn(&mut [u8])) {
-    let size = plan.bricks.format().n_bytes();
-    let mut edited = (*plan.bricks).clone();
-    edited.bytes_mut().chunks_exact_mut(size).for_each(edit);
-    plan.bricks = Arc::new(edited);
+fn edit_bytes(plan: &mut SpoiltPlan, edit: impl Fn(&mut [u8])) {
+    let size = plan.slots.format().n_bytes();
+    edit_samples(plan, |brick| {
+        let mut edited = brick.to_vec();
+        edited.chunks_exact_mut(size).for_each(&edit);
+        edited
+    });
 }
 
-fn redecode(plan: &mut FramePlan, change: impl Fn(Decode, f64) -> Decode) {
-    let decode = change(plan.bricks.decode(), transfer_range(plan));
-    let bricks = &plan.bricks;
-    let same = BrickSet::new(bricks.side(), bricks.format(), decode, bricks.bytes().to_vec());
-    plan.bricks = Arc::new(same.expect("whole bricks as before"));
+fn redecode(plan: &mut SpoiltPlan, change: impl Fn(Decode, f64) -> Decode) {
+    let decode = change(plan.slots.decode(), transfer_range(plan));
+    let slots = &plan.slots;
+    let same = Slots::new(slots.format(), decode, slots.places().clone(), slots.all_samples().to_vec());
+    plan.slots = Arc::new(same.expect("the same samples"));
 }
 
-fn transfer_range(plan: &FramePlan) -> f64 {
+fn transfer_range(plan: &SpoiltPlan) -> f64 {
     let knots = plan.transfer.knots();
     knots[knots.len() - 1].value - knots[0].value
 }
 
-fn edit_knots(plan: &mut FramePlan, edit: impl FnMut(&mut Knot)) {
+fn edit_knots(plan: &mut SpoiltPlan, edit: impl FnMut(&mut Knot)) {
     let mut knots = plan.transfer.knots().to_vec();
     knots.iter_mut().for_each(edit);
     plan.transfer = TransferFunction::new(knots).expect("a mutant's transfer function is one");
 }
 
 /// Moves all knots but the last up, the lower ones by more; jumps stay jumps, and the order stays.
-fn move_knot(plan: &mut FramePlan) {
+fn move_knot(plan: &mut SpoiltPlan) {
     let knots = plan.transfer.knots();
     let last = knots[knots.len() - 1].value;
     edit_knots(plan, |k| {

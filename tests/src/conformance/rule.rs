@@ -99,7 +99,7 @@ impl PlanTolerance {
 
     /// The rule on devices that filter with weights of so many bits; for the plan and the answer that it was made of.
     pub fn on(&self, plan: &FramePlan, reference: &Discrete, sub_texel_bits: u32) -> Tolerance {
-        let Mode::Fast { transmittance_floor } = plan.sampling.mode() else { return self.tolerance.clone() };
+        let Mode::Fast { transmittance_floor } = plan.sampling().mode() else { return self.tolerance.clone() };
         let filter = filter_rounding(plan, sub_texel_bits);
         let ends = |i: usize| {
             let transmittance = 1.0 - reference.image.pixels()[i][3];
@@ -155,11 +155,11 @@ impl Tolerance {
 /// The law of every picture, whatever its reference: 0 <= alpha <= 1, and colours within alpha times the transfer
 /// function's greatest, to the rounding of f32 and of the format in which pixels are blended.
 pub(crate) fn bounded(image: &Image<f32>, plan: &FramePlan, reference: &Discrete) -> Option<Complaint> {
-    let rounding = match plan.proxy.as_ref().map(|proxy| proxy.target()) {
+    let rounding = match plan.proxy().map(|proxy| proxy.target()) {
         None | Some(Target::Float32) => 0.0,
         Some(Target::Float16) => blending(plan, reference).into_iter().fold(0.0, f64::max),
     };
-    within_hull(image, &plan.transfer, rounding)
+    within_hull(image, plan.transfer(), rounding)
 }
 
 fn within_hull(image: &Image<f32>, transfer: &TransferFunction, rounding: f64) -> Option<Complaint> {
@@ -200,7 +200,7 @@ fn most_difference(plan: &FramePlan) -> Result<f64, Complaint> {
 
 /// How much the blending of polygons may change each pixel; 0 where rays are cast.
 fn blending(plan: &FramePlan, reference: &Discrete) -> Vec<f64> {
-    let rounding = match plan.proxy.as_ref().map(|proxy| proxy.target()) {
+    let rounding = match plan.proxy().map(|proxy| proxy.target()) {
         None => 0.0,
         Some(Target::Float32) => 3.0 * (-24f64).exp2(),
         Some(Target::Float16) => 3.0 * (-11f64).exp2(),
@@ -211,19 +211,19 @@ fn blending(plan: &FramePlan, reference: &Discrete) -> Vec<f64> {
 /// Most samples on any ray: the domain's diagonal in steps, along the direction that is slowest through it.
 fn longest_ray(plan: &FramePlan) -> u64 {
     let size = plan.size();
-    let ray = |i: u32| plan.rays.ray(i % size.x, i / size.x);
+    let ray = |i: u32| plan.rays().ray(i % size.x, i / size.x);
     let samples = |i: u32| {
         let ray = ray(i);
         let far = brickfield_core::Ray {
-            origin: plan.rays.center + ray.anchor - ray.direction * (ray.t_anchor - ray.t_eye),
+            origin: plan.rays().center + ray.anchor - ray.direction * (ray.t_anchor - ray.t_eye),
             direction: ray.direction,
         };
-        let n_cuts = f64::from(plan.index.dims().element_sum());
-        let more = if plan.sampling.division() == Division::Brick { n_cuts } else { 0.0 };
-        far.clip(&plan.domain).map_or(0.0, |s| (s.end - s.start) / (plan.sampling.step_world() * ray.stretch) + more)
+        let n_cuts = f64::from(plan.field().index().dims().element_sum());
+        let more = if plan.sampling().division() == Division::Brick { n_cuts } else { 0.0 };
+        far.clip(plan.domain()).map_or(0.0, |s| (s.end - s.start) / (plan.sampling().step_world() * ray.stretch) + more)
     };
     let most = (0..size.x * size.y).map(samples).fold(0.0, f64::max);
-    most.ceil() as u64 * plan.sampling.rule().nodes().len() as u64
+    most.ceil() as u64 * plan.sampling().rule().nodes().len() as u64
 }
 
 #[cfg(test)]

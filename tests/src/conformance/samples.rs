@@ -1,6 +1,6 @@
 //! Where interpolated values come from: the eight samples around a position.
 
-use brickfield::frame::{FramePlan, IndexEntry};
+use brickfield::frame::{FramePlan, IndexEntry, Reach};
 use brickfield_core::Volume;
 use brickfield_core::glam::{DVec3, UVec3};
 
@@ -50,18 +50,20 @@ impl Samples for VolumeSamples<'_> {
 
 impl Samples for PlanSamples<'_> {
     fn around(&self, q: DVec3) -> Option<Corners> {
-        let plan = self.0;
-        let n = plan.bricks.side().n_samples() as usize;
-        let q = q.clamp(DVec3::ZERO, plan.last_sample());
-        let at = (q / (n - 1) as f64).floor().as_uvec3().min(plan.index.dims() - 1);
-        let IndexEntry::Resident { slot, level } = plan.index.at(at) else { return None };
-        let first = (at >> u32::from(level.0) << u32::from(level.0)).as_dvec3() * (n - 1) as f64;
-        let s = (q - first) / f64::from(level.stride());
+        let field = self.0.field();
+        let slots = field.slots();
+        let n = slots.brick_side()?.n_samples() as usize;
+        let q = q.clamp(DVec3::ZERO, field.last_sample());
+        let at = (q / (n - 1) as f64).floor().as_uvec3().min(field.index().dims() - 1);
+        let IndexEntry::Resident { slot, reach: Reach(level) } = field.index().at(at) else { return None };
+        let bytes = slots.samples(slot)?.bytes();
+        let first = (at >> u32::from(level) << u32::from(level)).as_dvec3() * (n - 1) as f64;
+        let s = (q - first) / f64::from(1u32 << level);
         let low = s.floor().clamp(DVec3::ZERO, DVec3::splat((n - 2) as f64));
         let value = |c: usize| {
             let p = low.as_uvec3() + UVec3::new(c as u32 & 1, c as u32 >> 1 & 1, c as u32 >> 2);
             let i = p.x as usize + n * (p.y as usize + n * p.z as usize);
-            plan.bricks.decode().value(plan.bricks.read(slot as usize * n.pow(3) + i))
+            slots.decode().value(slots.format().read(bytes, i))
         };
         Some(Corners { values: std::array::from_fn(value), fraction: s - low })
     }

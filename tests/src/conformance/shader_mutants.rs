@@ -44,23 +44,23 @@ macro_rules! mutants {
 
 mutants! {
     /// The nearest sample instead of the trilinear value.
-    NEAREST: "nearest", "bricks", "filtered", "let f = s - cell;" => "let f = floor(s - cell + 0.5);";
+    NEAREST: "nearest", "texels", "filtered", "let f = s - cell;" => "let f = floor(s - cell + 0.5);";
     /// The wrong weight along y.
-    LERP_SWAPPED: "lerp-swapped", "bricks", "filtered", "return lerp(lerp(x00, x10, f.y), lerp(x01, x11, f.y), f.z);"
+    LERP_SWAPPED: "lerp-swapped", "texels", "filtered", "return lerp(lerp(x00, x10, f.y), lerp(x01, x11, f.y), f.z);"
         => "return lerp(lerp(x00, x10, f.x), lerp(x01, x11, f.x), f.z);";
     /// Positions are not clamped to the first and last sample.
-    NO_CLAMP: "no-clamp", "bricks", "value_at", "clamp(local(block, p), vec3f(0.0), block.last)" => "local(block, p)";
+    NO_CLAMP: "no-clamp", "field/bricks", "value_at", "clamp(local(area, p), vec3f(0.0), area.last)" => "local(area, p)";
     /// Index rows are as long as columns.
-    INDEX_STRIDE: "index-stride", "bricks", "block_at", "index[cell.x + dims.x * (cell.y + dims.y * cell.z)]"
+    INDEX_STRIDE: "index-stride", "index", "word_at", "index[cell.x + dims.x * (cell.y + dims.y * cell.z)]"
         => "index[cell.x + dims.y * (cell.y + dims.x * cell.z)]";
     /// The next slot's brick.
-    ATLAS_ROW: "atlas-row", "bricks", "texel_of", "let row = slot / bricks.x;" => "let row = slot / bricks.y;";
+    ATLAS_ROW: "atlas-row", "field/bricks", "texel_of", "let row = slot / bricks.x;" => "let row = slot / bricks.y;";
     /// Coarse bricks are read as if they were fine.
-    LEVEL_SCALE: "level-scale", "bricks", "block_of", "block.scale = 1.0 / f32(1u << level);" => "block.scale = 1.0;";
+    LEVEL_SCALE: "level-scale", "field/bricks", "patch_of", "area.scale = 1.0 / f32(1u << block.reach);" => "area.scale = 1.0;";
     /// Coarse bricks begin at the cell, not at their block.
-    BLOCK_CORNER: "block-corner", "bricks", "block_of", "let first = (cell >> vec3u(level)) << vec3u(level);" => "let first = cell;";
+    BLOCK_CORNER: "block-corner", "index", "block_of", "let first = (cell >> vec3u(reach)) << vec3u(reach);" => "let first = cell;";
     /// The hardware filter looks half a texel beside.
-    HALF_TEXEL: "half-texel", "bricks", "filtered", "(texel + s + 0.5)" => "(texel + s)";
+    HALF_TEXEL: "half-texel", "texels", "filtered", "(texel + s + 0.5)" => "(texel + s)";
     /// alpha = tau h.
     ALPHA_LINEAR: "alpha-linear", "scalar", "alpha", "select(1.0 - exp(-x), series, x < 0.25)" => "min(x, 1.0)";
     /// alpha = 1 - e^-x at every x: no digits near 0.
@@ -83,19 +83,19 @@ mutants! {
     /// Pre-integrated pieces have the mean colour of their ends.
     PIECE_MEAN: "piece-mean", "preintegrated", "linear_piece", "(2.0 * near.w + far.w) / (3.0 * max(total, 1e-37))" => "0.5";
     /// The transfer function is continuous from the left.
-    LEFT_CONTINUOUS: "left-continuous", "transfer", "further", "knots[next].value.x <= value" => "knots[next].value.x < value";
+    LEFT_CONTINUOUS: "left-continuous", "transfer", "further", "knots[next].value <= value" => "knots[next].value < value";
     /// The transfer function goes on beyond its last knot.
-    NOT_CONSTANT_OUTSIDE: "not-constant-outside", "transfer", "on_line", "clamp((value - low.value.x) * low.value.y, 0.0, 1.0)"
-        => "(value - low.value.x) * low.value.y";
+    NOT_CONSTANT_OUTSIDE: "not-constant-outside", "transfer", "on_line", "clamp((value - low.value) * low.per_value, 0.0, 1.0)"
+        => "(value - low.value) * low.per_value";
     /// Steps instead of lines between knots.
     STEPS: "steps", "transfer", "on_line", "low.optics + (high - low.optics) * f" => "low.optics";
     /// Rays pass the pixels' corners.
-    PIXEL_CORNER: "pixel-corner", "rays", "pixel_ray", "let at = pixel + 0.5 - 0.5 * vec2f(frame.size.xy);"
-        => "let at = pixel - 0.5 * vec2f(frame.size.xy);";
+    PIXEL_CORNER: "pixel-corner", "rays", "pixel_ray", "let at = pixel + 0.5 - 0.5 * vec2f(frame.size);"
+        => "let at = pixel - 0.5 * vec2f(frame.size);";
     /// Directions are not normalised.
     NOT_NORMALISED: "not-normalised", "rays", "pixel_ray", "let length = sqrt(1.0 + square);" => "let length = 1.0;";
     /// The phase of the shells is that of a plane.
-    FLAT_SHELLS: "flat-shells", "rays", "pixel_ray", "frame.anchor_down.w * (square / (1.0 + length))" => "0.0";
+    FLAT_SHELLS: "flat-shells", "rays", "pixel_ray", "frame.anchor_depth * (square / (1.0 + length))" => "0.0";
     /// The first segment is not shortened.
     FIRST_NOT_CUT: "first-not-cut", "segments", "piece_of", "select(boundary(ray, k), walk.span.start, k == walk.first)"
         => "boundary(ray, k)";
@@ -110,17 +110,17 @@ mutants! {
     /// A brick keeps the ray for two segments too many.
     OVERSTAYS: "overstays", "segments", "stop_in", "stop = max(k + 1.0, min(stop, min(walk.end, walk.last)));"
         => "stop = max(k + 1.0, min(stop + 2.0, min(walk.end, walk.last)));";
-    /// A jump over a transparent block goes 24 segments too far: two would reach only the dark rim of the next block.
-    JUMPS_TOO_FAR: "jumps-too-far", "march", "integrate", "k = block_stop;" => "k = block_stop + 24.0;";
+    /// A jump over an empty block goes 24 segments too far: two would reach only the dark rim of the next block.
+    JUMPS_TOO_FAR: "jumps-too-far", "integrate/rays", "integrate", "k = patch_stop;" => "k = patch_stop + 24.0;";
     /// A leap over dark macrocells goes 8 segments too far.
-    LEAPS_TOO_FAR: "leaps-too-far", "march", "integrate", "k = end;" => "k = end + 8.0;";
+    LEAPS_TOO_FAR: "leaps-too-far", "integrate/rays", "integrate", "k = end;" => "k = end + 8.0;";
     /// The same, in bricks with segments of their own.
-    LEAPS_TOO_FAR_IN_BRICK: "leaps-too-far-in-brick", "march", "integrate_in", "walk.k = end;" => "walk.k = end + 8.0;";
+    LEAPS_TOO_FAR_IN_BRICK: "leaps-too-far-in-brick", "integrate/bricks", "integrate_in", "walk.k = end;" => "walk.k = end + 8.0;";
     /// Of segments with two nodes, the far one may lie anywhere.
     FAR_NODE_FORGOTTEN: "far-node-forgotten", "segments", "stop_in", "stop = select(k, stop, own);" => "";
     /// Macrocells of another row are read.
-    MACROCELL_ROW: "macrocell-row", "bricks", "macrocells_at", "at.x + n * (at.y + n * (at.z + n * block.slot))"
-        => "at.y + n * (at.x + n * (at.z + n * block.slot))";
+    MACROCELL_ROW: "macrocell-row", "field/bricks", "dark_around", "at.x + n * (at.y + n * (at.z + n * area.slot))"
+        => "at.y + n * (at.x + n * (at.z + n * area.slot))";
     /// The beam of the tile mirrored at the diagonal is read.
     BEAM_MIRRORED: "beam-mirrored", "march", "march", "beams[tile.x + tile.y * n_columns]" => "beams[tile.y + tile.x * n_columns]";
     /// Rays end where their beam has come half its way.
@@ -129,17 +129,17 @@ mutants! {
     /// The light of a ray's earlier passes is forgotten.
     PASS_FORGETS: "pass-forgets", "march", "integrate_on", "before = seen_before[slot];" => "before = vec4f(0.0);";
     /// A pass begins at the ray's first segment.
-    PASS_RESTARTS: "pass-restarts", "march", "integrate_on", "walk.k = max(walk.k, frame.visible_max.w);" => "";
+    PASS_RESTARTS: "pass-restarts", "march", "integrate_on", "walk.k = max(walk.k, frame.first_segment);" => "";
     /// 16-bit samples are counted from the first knot's as fractions, not as integers.
-    FRACTIONS_OF_16_BITS: "fractions-of-16-bits", "bricks", "load",
-        "round(textureLoad(atlas, i, 0).x * 65535.0) - frame.last_sample.w"
-        => "(textureLoad(atlas, i, 0).x - frame.last_sample.w / 65535.0) * 65535.0";
+    FRACTIONS_OF_16_BITS: "fractions-of-16-bits", "texels", "load",
+        "round(textureLoad(atlas, i, 0).x * 65535.0) - frame.counted_from"
+        => "(textureLoad(atlas, i, 0).x - frame.counted_from / 65535.0) * 65535.0";
     /// Rays end at a transmittance of 1/5.
-    ENDS_EARLY: "ends-early", "march", "ended", "exp(-seen.w) < frame.direction_down.w" => "exp(-seen.w) < 0.2";
+    ENDS_EARLY: "ends-early", "ending", "ended", "exp(-seen.w) < frame.transmittance_floor" => "exp(-seen.w) < 0.2";
     /// Bricks have the steps of level 0, whatever their level.
-    STEPS_OF_LEVEL_0: "steps-of-level-0", "segments", "in_steps_of", "own.apart *= f32(stride_of(block));" => "";
+    STEPS_OF_LEVEL_0: "steps-of-level-0", "segments", "in_steps_of", "own.apart *= steps_in(area);" => "";
     /// A brick's segments go on to the end of the ray.
-    BRICK_NOT_LEFT: "brick-not-left", "march", "integrate", "span.end = min(exit, visible.end);" => "span.end = visible.end;";
+    BRICK_NOT_LEFT: "brick-not-left", "integrate/bricks", "integrate", "span.end = min(exit, visible.end);" => "span.end = visible.end;";
     /// Nominal lengths have the angle's stretch.
     NOMINAL_STRETCHED: "nominal-stretched", "segments", "whole_piece", "piece.weight = ray.apart;" => "piece.weight = step_of(ray);";
     /// The segments of polygons begin at the surface before, even outside of the brick.

@@ -92,10 +92,10 @@ pub(super) fn duel(
 impl Drawn {
     fn of(plan: &FramePlan) -> Drawn {
         Drawn {
-            n_bricks: plan.bricks.n_bricks() as usize,
-            n_bytes: plan.bricks.bytes().len(),
-            n_polygons: plan.proxy.as_ref().map_or(0, |proxy| proxy.n_polygons()),
-            has_coarse: plan.features.contains(Feature::MultiLevel),
+            n_bricks: plan.field().slots().n_filled(),
+            n_bytes: plan.field().slots().n_bytes(),
+            n_polygons: plan.proxy().map_or(0, |proxy| proxy.n_polygons()),
+            has_coarse: plan.features().contains(Feature::MultiLevel),
         }
     }
 }

@@ -31,13 +31,14 @@ pub(crate) struct Image {
 }
 
 impl Image {
-    /// A 3-D texture that copies fill and shaders read.
+    /// A 3-D texture that copies fill and read, and shaders read.
     pub(crate) fn texture_3d(device: &Arc<Device>, format: SampleFormat, extent: UVec3) -> Result<Image, RenderError> {
         let n_bytes = format.n_bytes() as u64 * n_texels(extent);
         let format = vulkan_format(format);
-        let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
+        let copies = vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
+        let usage = vk::ImageUsageFlags::SAMPLED | copies;
         let info = vk::ImageCreateInfo::default().image_type(vk::ImageType::TYPE_3D).format(format).usage(usage);
-        Image::new(device, ("the brick atlas", n_bytes), vk::ImageViewType::TYPE_3D, info, extent)
+        Image::new(device, ("the atlas", n_bytes), vk::ImageViewType::TYPE_3D, info, extent)
     }
 
     /// A picture of four floats a pixel that shaders write and copies read.

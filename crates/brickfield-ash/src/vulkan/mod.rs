@@ -24,6 +24,6 @@ pub(crate) use image::{Image, Sampler, vulkan_format};
 pub(crate) use instance::Instance;
 pub(crate) use memory::Residence;
 pub use messages::ValidationLog;
-pub(crate) use pipeline::{BoundPipeline, Pipeline, Resource};
+pub(crate) use pipeline::{Bindable, BoundPipeline, Pipeline};
 pub(crate) use queue::Queue;
 pub(crate) use recorder::{ImageBox, Recorder, Triangles, Use};

@@ -6,12 +6,13 @@ use std::mem::offset_of;
 use std::sync::Arc;
 
 use ash::vk;
-use brickfield_frame::{ProxyCorner, RenderError, Target};
+use brickfield_frame::{ProxyCorner, RenderError, Resource, Target};
 use brickfield_shaders::{Binding, BindingKind, Entry, Specialised};
 
 use super::canvas::RenderPass;
 use super::{Buffer, Device, Image, Sampler};
 use crate::error::OfCall;
+use crate::resources::missing;
 
 /// A shader variant, ready to be dispatched or drawn with.
 pub(crate) struct Pipeline {
@@ -28,7 +29,7 @@ pub(crate) struct Pipeline {
 
 /// What a shader's binding is bound to; buffers from their start, with the bytes that the shader sees.
 #[derive(Clone, Copy)]
-pub(crate) enum Resource<'a> {
+pub(crate) enum Bindable<'a> {
     Buffer { buffer: &'a Buffer, n_bytes: u64 },
     Texture(&'a Image),
     Sampler(&'a Sampler),
@@ -61,13 +62,18 @@ impl Pipeline {
         Ok(pipeline)
     }
 
-    /// Whether the shader has a binding of this number.
-    pub(crate) fn binds(&self, index: u32) -> bool {
-        self.bindings.iter().any(|b| b.index == index)
+    /// All that the shader reads and writes.
+    pub(crate) fn bindings(&self) -> &[Binding] {
+        &self.bindings
+    }
+
+    /// Whether the shader reads or writes a resource.
+    pub(crate) fn uses(&self, resource: Resource) -> bool {
+        self.bindings.iter().any(|b| b.resource == resource)
     }
 
     /// Whether the shader has a binding of a kind.
-    pub(crate) fn needs(&self, kind: BindingKind) -> bool {
+    pub(crate) fn has(&self, kind: BindingKind) -> bool {
         self.bindings.iter().any(|b| b.kind == kind)
     }
 
@@ -76,48 +82,49 @@ impl Pipeline {
         self.workgroup_size
     }
 
-    /// Binds what the shader needs; `resource` says what a binding index stands for.
+    /// Binds what the shader needs; `bindable` says what a binding stands for.
     pub(crate) fn bind<'a>(
         &'a mut self,
-        resource: impl Fn(u32) -> Option<Resource<'a>>,
+        bindable: impl Fn(&Binding) -> Option<Bindable<'a>>,
     ) -> Result<BoundPipeline<'a>, RenderError> {
         for binding in &self.bindings {
-            let resource = resource(binding.index).ok_or_else(|| RenderError::Shader {
-                message: format!("binding {} ({:?}) is none that a plan fills", binding.index, binding.kind),
-            })?;
-            self.write(*binding, resource)?;
+            self.write(*binding, bindable(binding).ok_or_else(|| missing(binding.resource))?)?;
         }
         Ok(BoundPipeline { pipeline: self })
     }
 
-    fn write(&self, Binding { index, kind }: Binding, resource: Resource<'_>) -> Result<(), RenderError> {
-        let buffer = match resource {
-            Resource::Buffer { buffer, n_bytes } => {
+    fn write(&self, Binding { index, resource, kind }: Binding, bindable: Bindable<'_>) -> Result<(), RenderError> {
+        let buffer = match bindable {
+            Bindable::Buffer { buffer, n_bytes } => {
                 vk::DescriptorBufferInfo::default().buffer(buffer.raw).range(n_bytes.min(buffer.n_bytes()))
             }
             _ => vk::DescriptorBufferInfo::default(),
         };
         let image = vk::DescriptorImageInfo::default();
-        let image = match resource {
-            Resource::Texture(t) => image.image_view(t.view).image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
-            Resource::Picture(p) => image.image_view(p.view).image_layout(vk::ImageLayout::GENERAL),
-            Resource::Sampler(s) => image.sampler(s.raw),
-            Resource::Buffer { .. } => image,
+        let image = match bindable {
+            Bindable::Texture(t) => image.image_view(t.view).image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL),
+            Bindable::Picture(p) => image.image_view(p.view).image_layout(vk::ImageLayout::GENERAL),
+            Bindable::Sampler(s) => image.sampler(s.raw),
+            Bindable::Buffer { .. } => image,
         };
         let (buffers, images) = ([buffer], [image]);
         let write = vk::WriteDescriptorSet::default()
             .dst_set(self.set)
             .dst_binding(index)
             .descriptor_type(descriptor_type(kind));
-        let write = match (kind, resource) {
+        let write = match (kind, bindable) {
             (
                 BindingKind::Uniform | BindingKind::StorageRead | BindingKind::StorageReadWrite,
-                Resource::Buffer { .. },
+                Bindable::Buffer { .. },
             ) => write.buffer_info(&buffers),
-            (BindingKind::Texture3d, Resource::Texture(_))
-            | (BindingKind::Sampler, Resource::Sampler(_))
-            | (BindingKind::StorageImage, Resource::Picture(_)) => write.image_info(&images),
-            _ => return Err(RenderError::Shader { message: format!("binding {index} is unexpectedly a {kind:?}") }),
+            (BindingKind::Texture3d, Bindable::Texture(_))
+            | (BindingKind::Sampler, Bindable::Sampler(_))
+            | (BindingKind::StorageImage, Bindable::Picture(_)) => write.image_info(&images),
+            _ => {
+                return Err(RenderError::Shader {
+                    message: format!("`{}` is unexpectedly a {kind:?}", resource.name()),
+                });
+            }
         };
         // SAFETY: the set is of this layout and not in use: the device is idle, and binding borrows the pipeline mutably.
         unsafe { self.device.raw().update_descriptor_sets(&[write], &[]) };

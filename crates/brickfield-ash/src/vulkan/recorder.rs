@@ -102,6 +102,21 @@ impl<'q, 'a> Recorder<'q, 'a> {
         unsafe { self.device.cmd_copy_image_to_buffer(self.commands, from.raw, layout, to.buffer().raw, &regions) };
     }
 
+    /// Copies all texels of a [`Use::CopySource`] to the same place in a [`Use::CopyTarget`] that is as large or larger.
+    pub(crate) fn copy_image(&mut self, from: &'a Image, to: &'a Image) {
+        assert!(from.extent().cmple(to.extent()).all(), "a copy past the end of an image");
+        let layers = vk::ImageSubresourceLayers {
+            aspect_mask: vk::ImageAspectFlags::COLOR,
+            layer_count: 1,
+            ..Default::default()
+        };
+        let region =
+            vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(extent_3d(from.extent()));
+        let (source, target) = (Use::CopySource.layout(), Use::CopyTarget.layout());
+        // SAFETY: all of the source is inside the target (asserted), both outlive the run, are of one format and allow copies.
+        unsafe { self.device.cmd_copy_image(self.commands, from.raw, source, to.raw, target, &[region]) };
+    }
+
     /// Sets all texels of an image that is a [`Use::CopyTarget`] to 0.
     pub(crate) fn clear(&mut self, image: &'a Image) {
         let (zero, layout) = (vk::ClearColorValue { float32: [0.0; 4] }, Use::CopyTarget.layout());

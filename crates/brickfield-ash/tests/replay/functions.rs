@@ -1,7 +1,7 @@
 //! Single functions of the shaders.
 
 use brickfield_ash::{AshBackend, Validation};
-use brickfield_frame::{Backend, Mode, QuadratureRule, SampleFormat, ShaderFunction};
+use brickfield_frame::{Evaluate, Mode, QuadratureRule, SampleFormat, ShaderFunction};
 use brickfield_shaders::ShaderLibrary;
 
 use crate::connect;
@@ -29,8 +29,8 @@ fn opacity_is_that_of_the_depth_over_several_dispatches() {
 fn every_sample_is_found_in_its_brick() {
     let Some(mut backend) = connect(Validation::Off) else { return };
     for format in [SampleFormat::Unorm8, SampleFormat::Unorm16, SampleFormat::Float32] {
-        let bricks = bumps(format);
-        let plan = plan(bricks.clone(), rising(0.1), QuadratureRule::MidpointExponential, Mode::Exact);
+        let slots = bumps(format);
+        let plan = plan(slots.clone(), rising(0.1), QuadratureRule::MidpointExponential, Mode::Exact);
         let at = |i: u32| [i % 31, i / 31 % 16, i / (31 * 16)];
         let inputs: Vec<_> = (0..31 * 16 * 16)
             .map(|i| {
@@ -42,8 +42,8 @@ fn every_sample_is_found_in_its_brick() {
         for (i, output) in outputs.iter().enumerate() {
             let [x, y, z] = at(i as u32);
             let slot = (x / 15).min(1);
-            let stored = (((slot * 16 + z) * 16 + y) * 16 + x - slot * 15) as usize;
-            let expected = bricks.decode().value(bricks.read(stored));
+            let sample = ((z * 16 + y) * 16 + x - slot * 15) as usize;
+            let expected = slots.decode().value(format.read(slots.samples(slot).unwrap().bytes(), sample));
             assert!(
                 (f64::from(output[0]) - expected).abs() < 1e-5,
                 "{:?}: {output:?}, expected {expected}",

@@ -4,6 +4,7 @@ mod functions;
 mod pictures;
 mod plans;
 mod refusals;
+mod reuse;
 mod validation;
 
 use brickfield_ash::{AshBackend, ConnectError, Options, Validation};

@@ -1,14 +1,10 @@
 //! Pictures against closed forms.
 
-use std::sync::Arc;
-
 use brickfield_ash::{Options, Validation};
 use brickfield_core::{Aabb, Image, TransferFunction, glam::DVec3};
-use brickfield_frame::{
-    Backend, Feature, FeatureSet, FramePlan, Mode, Placement, QuadratureRule, SampleFormat, Target,
-};
+use brickfield_frame::{Backend, Feature, FeatureSet, Mode, Placement, QuadratureRule, SampleFormat, Target};
 
-use crate::plans::{bumps, nothing, plan, polygons, ramp, rising};
+use crate::plans::{bumps, nothing, plan, polygons, ramp, rising, with_features, with_visible};
 use crate::{connect, connect_with};
 
 const PLACEMENTS: [Placement; 3] =
@@ -34,13 +30,12 @@ fn a_homogeneous_slab_has_its_closed_form_in_every_rule() {
     let Some(mut backend) = connect(Validation::Off) else { return };
     let transfer = TransferFunction::constant(0.07, [0.2, 0.4, 0.8]).unwrap();
     for rule in QuadratureRule::ALL.into_iter().filter(|r| *r != QuadratureRule::LeftRiemann) {
-        let mut plan = plan(ramp(SampleFormat::Unorm8), transfer.clone(), rule, Mode::Exact);
+        let plan = plan(ramp(SampleFormat::Unorm8), transfer.clone(), rule, Mode::Exact);
         // Nothing is dark here, and the plan has neither a map of macrocells nor beams.
         let unneeded = [Feature::HardwareFilter, Feature::SkipMacrocells, Feature::SkipBesideBeams];
         let general = unneeded.into_iter().fold(FeatureSet::all(), FeatureSet::without);
-        for features in [plan.features, general] {
-            plan.features = features;
-            let frame = backend.render(&plan).unwrap();
+        for plan in [&plan, &with_features(&plan, general)] {
+            let frame = backend.render(plan).unwrap();
             assert_close(&frame.image, layer(0.07 * 16.0, [0.2, 0.4, 0.8]), 1e-6, rule.name());
         }
     }
@@ -67,8 +62,9 @@ fn a_frame_without_anything_visible_is_transparent() {
     let full = plan(bumps(SampleFormat::Unorm8), rising(0.1), QuadratureRule::MidpointExponential, FAST);
     let transparent = Image::transparent(full.size());
     assert_eq!(backend.render(&nothing(&full)).unwrap().image, transparent);
-    let invisible = FramePlan { visible: Aabb { min: DVec3::ZERO, max: DVec3::ZERO }, ..nothing(&full) };
-    assert_eq!(backend.render(&invisible).unwrap().image, transparent);
+    // By such a box rays are marched through the index, which is empty.
+    let marched = with_visible(&nothing(&full), *full.domain());
+    assert_eq!(backend.render(&marched).unwrap().image, transparent);
     assert_ne!(backend.render(&full).unwrap().image, transparent);
 }
 
@@ -91,7 +87,7 @@ fn a_picture_in_many_submits_is_the_same_to_the_bit() {
     let whole = backend.render(&plan).unwrap();
     // By such a box a ray has 10^8 segments, and a row of workgroups is a submit of its own.
     let visible = Aabb { min: DVec3::splat(-1e8), max: DVec3::splat(1e8) };
-    let bands = backend.render(&FramePlan { visible, ..plan }).unwrap();
+    let bands = backend.render(&with_visible(&plan, visible)).unwrap();
     assert_eq!(whole.image, bands.image);
 }
 
@@ -119,9 +115,8 @@ fn a_picture_of_many_small_copies_and_batches_is_the_same_to_the_bit() {
         assert_eq!(whole.render(&rays).unwrap().image, pieces.render(&rays).unwrap().image);
         for target in [Target::Float32, Target::Float16] {
             let polygons = polygons(&rays, Placement::ViewportPlanes, target);
-            let mut batches = polygons.clone();
-            batches.proxy = polygons.proxy.as_deref().map(|proxy| Arc::new(proxy.clone().in_batches_of(7)));
-            assert!(batches.proxy.as_deref().is_some_and(|proxy| proxy.batches().len() > 9));
+            let batches = polygons.clone().in_batches_of(7);
+            assert!(batches.proxy().is_some_and(|proxy| proxy.batches().len() > 9));
             assert_eq!(whole.render(&polygons).unwrap().image, pieces.render(&batches).unwrap().image);
         }
     }

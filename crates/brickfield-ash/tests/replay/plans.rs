@@ -5,8 +5,9 @@ use std::sync::Arc;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BrickSide, Camera, Grid, Knot, Level, Projection, TransferFunction};
 use brickfield_frame::{
-    BrickSet, Decode, Division, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, Placement, ProxyGeometry,
-    QuadratureRule, RayFrame, SampleFormat, Sampling, Steps, Target,
+    DarkRegions, Decode, Division, Drawing, FeatureSet, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join,
+    Mode, Placement, PlanParts, QuadratureRule, RayFrame, Reach, SampleFormat, Sampling, Slots, SpoiltPlan, Steps,
+    Target,
 };
 
 const N: u32 = 16;
@@ -14,19 +15,19 @@ const DIMS: UVec3 = UVec3::new(2 * N - 1, N, N);
 
 /// Two bricks side by side along x: 31 x 16 x 16 samples whose value is their z. A third brick is nowhere: with it the
 /// atlas has a place that no brick fills.
-pub(crate) fn ramp(format: SampleFormat) -> BrickSet {
+pub(crate) fn ramp(format: SampleFormat) -> Slots {
     filled(format, |_, p| p.z)
 }
 
 /// The same with values that vary along all axes and from brick to brick, all of them 0 to 15.
-pub(crate) fn bumps(format: SampleFormat) -> BrickSet {
+pub(crate) fn bumps(format: SampleFormat) -> Slots {
     filled(format, |slot, p| {
         let x = p.x + slot * (N - 1);
         (x * 7 + p.y * 5 + p.z * 3 + x * p.y / 4) % N
     })
 }
 
-fn filled(format: SampleFormat, value: impl Fn(u32, UVec3) -> u32) -> BrickSet {
+fn filled(format: SampleFormat, value: impl Fn(u32, UVec3) -> u32) -> Slots {
     let (decode, per_value) = match format {
         SampleFormat::Unorm8 => (Decode { scale: 255.0 / 16.0, offset: 0.0 }, 16),
         SampleFormat::Unorm16 => (Decode { scale: 65535.0 / 4096.0, offset: 0.0 }, 4096),
@@ -41,7 +42,7 @@ fn filled(format: SampleFormat, value: impl Fn(u32, UVec3) -> u32) -> BrickSet {
             _ => bytes.extend(&stored.to_le_bytes()[..format.n_bytes()]),
         }
     }
-    BrickSet::new(BrickSide::S16, format, decode, bytes).unwrap()
+    Slots::even(BrickSide::S16, format, decode, &bytes).unwrap()
 }
 
 /// Extinction 0 at value 0, rising by `slope` per unit of value up to 16.
@@ -51,38 +52,47 @@ pub(crate) fn rising(slope: f64) -> TransferFunction {
 }
 
 /// A picture of the two bricks along z: all rays cross 16 voxels of 1 world unit.
-pub(crate) fn plan(bricks: BrickSet, transfer: TransferFunction, rule: QuadratureRule, mode: Mode) -> FramePlan {
+pub(crate) fn plan(slots: Slots, transfer: TransferFunction, rule: QuadratureRule, mode: Mode) -> FramePlan {
     let sampling = Sampling::new(0.5, rule, mode).unwrap();
-    let rays = rays(&Steps::shells(sampling.step_world()));
-    let mut index = IndexGrid::transparent(UVec3::new(2, 1, 1));
-    for slot in 0..2 {
-        index.fill(UVec3::new(slot, 0, 0), IndexEntry::Resident { slot, level: Level(0) });
-    }
-    let features = features(&transfer, mode);
-    FramePlan {
-        dims: DIMS,
-        rays,
+    let entry = |slot: u32| (UVec3::new(slot, 0, 0), IndexEntry::Resident { slot, reach: Reach(0) });
+    let parts = PlanParts {
+        field: field([0, 1].map(entry), slots),
+        rays: rays(&Steps::shells(sampling.step_world())),
         domain: domain(),
-        visible: domain(),
         sampling,
         transfer,
-        index,
-        bricks: Arc::new(bricks),
-        occupancy: None,
-        beams: None,
-        proxy: None,
-        features,
+        dark: DarkRegions::default(),
+        drawing: Drawing::Rays,
+    };
+    FramePlan::new(parts).unwrap()
+}
+
+fn field(entries: impl IntoIterator<Item = (UVec3, IndexEntry)>, slots: Slots) -> Field {
+    let lattice = IndexLattice { cell_samples: N - 1, origin: 0.0 };
+    let index = IndexGrid::new(UVec3::new(2, 1, 1), lattice, entries);
+    Field::new(DIMS, Arc::new(index), Arc::new(slots), Join::Shared).unwrap()
+}
+
+/// What a plan was built from, with rays.
+fn parts(plan: &FramePlan) -> PlanParts {
+    PlanParts {
+        field: plan.field().clone(),
+        rays: *plan.rays(),
+        domain: *plan.domain(),
+        sampling: *plan.sampling(),
+        transfer: plan.transfer().clone(),
+        dark: DarkRegions::default(),
+        drawing: Drawing::Rays,
     }
 }
 
 /// The same through the rasteriser.
 pub(crate) fn polygons(plan: &FramePlan, placement: Placement, target: Target) -> FramePlan {
-    let sampling = plan.sampling.divided(Division::Brick);
+    let sampling = plan.sampling().divided(Division::Brick);
     let rays = rays(&Steps::of(&sampling, placement, Level(0)).unwrap());
-    let mut plan = FramePlan { rays, sampling, ..plan.clone() };
-    let beside_each_other = [UVec3::ZERO, UVec3::X];
-    plan.proxy = Some(Arc::new(ProxyGeometry::of(&plan, &beside_each_other, target)));
-    plan
+    let beside_each_other = vec![UVec3::ZERO, UVec3::X];
+    let drawing = Drawing::Polygons { back_to_front: beside_each_other, target };
+    FramePlan::new(PlanParts { rays, sampling, drawing, ..parts(plan) }).unwrap()
 }
 
 fn rays(steps: &Steps) -> RayFrame {
@@ -99,23 +109,26 @@ fn domain() -> Aabb {
 
 /// The same with nothing in it.
 pub(crate) fn nothing(plan: &FramePlan) -> FramePlan {
-    let bricks = &plan.bricks;
-    let empty = BrickSet::new(bricks.side(), bricks.format(), bricks.decode(), Vec::new()).unwrap();
-    FramePlan {
-        index: IndexGrid::transparent(plan.index.dims()),
-        bricks: Arc::new(empty),
-        features: plan.features.with(Feature::SkipTransparent),
-        ..plan.clone()
-    }
+    let slots = plan.field().slots();
+    let empty = Slots::even(BrickSide::S16, slots.format(), slots.decode(), &[]).unwrap();
+    FramePlan::new(PlanParts { field: field([], empty), ..parts(plan) }).unwrap()
 }
 
-fn features(transfer: &TransferFunction, mode: Mode) -> FeatureSet {
-    let mut features = FeatureSet::default();
-    if transfer.knots().len() > 1 {
-        features = features.with(Feature::TransferLookup);
-    }
-    match mode {
-        Mode::Exact => features,
-        Mode::Fast { .. } => features.with(Feature::HardwareFilter).with(Feature::EarlyTermination),
-    }
+/// The same in another size, with pixels as large.
+pub(crate) fn of_size(plan: &FramePlan, size: UVec2) -> FramePlan {
+    FramePlan::new(PlanParts { rays: RayFrame { size, ..*plan.rays() }, ..parts(plan) }).unwrap()
+}
+
+/// The same with a box of what is visible that may be larger than it is.
+pub(crate) fn with_visible(plan: &FramePlan, visible: Aabb) -> FramePlan {
+    let mut spoilt = SpoiltPlan::of(plan);
+    spoilt.visible = visible;
+    spoilt.into_plan()
+}
+
+/// The same with other features.
+pub(crate) fn with_features(plan: &FramePlan, features: FeatureSet) -> FramePlan {
+    let mut spoilt = SpoiltPlan::of(plan);
+    spoilt.features = features;
+    spoilt.into_plan()
 }

@@ -5,7 +5,7 @@ use brickfield_core::glam::UVec2;
 use brickfield_frame::{Backend, Mode, QuadratureRule, RenderError, SampleFormat};
 
 use crate::connect;
-use crate::plans::{plan, ramp, rising};
+use crate::plans::{of_size, plan, ramp, rising};
 
 #[test]
 fn an_adapter_that_is_not_there_is_answered_with_those_that_are() {
@@ -23,9 +23,8 @@ fn an_adapter_that_is_not_there_is_answered_with_those_that_are() {
 fn a_picture_beyond_the_limit_is_refused_and_the_backend_lives_on() {
     let Some(mut backend) = connect(Validation::Off) else { return };
     let small = plan(ramp(SampleFormat::Unorm8), rising(0.1), QuadratureRule::MidpointExponential, Mode::Exact);
-    let mut large = small.clone();
     let limit = backend.describe().capabilities.max_image;
-    large.rays.size = UVec2::new(limit + 1, 1);
+    let large = of_size(&small, UVec2::new(limit + 1, 1));
     assert!(matches!(backend.render(&large), Err(RenderError::ImageTooLarge { limit: l, .. }) if l == limit));
     assert!(backend.render(&small).is_ok());
 }

@@ -1,13 +1,13 @@
 //! The validation layer, synchronisation included, has nothing to say.
 
-use std::sync::Arc;
-
 use brickfield_ash::{AshBackend, Validation};
 use brickfield_core::{TransferFunction, glam::UVec2};
-use brickfield_frame::{Backend, FramePlan, Mode, Placement, QuadratureRule, SampleFormat, ShaderFunction, Target};
+use brickfield_frame::{
+    Backend, Evaluate, FramePlan, Mode, Placement, QuadratureRule, SampleFormat, ShaderFunction, Target,
+};
 
 use crate::connect;
-use crate::plans::{bumps, nothing, plan, polygons, ramp, rising};
+use crate::plans::{bumps, nothing, of_size, plan, polygons, ramp, rising, with_visible};
 
 const FAST: Mode = Mode::Fast { transmittance_floor: 1e-3 };
 
@@ -25,8 +25,7 @@ fn the_layer_is_silent_from_the_first_call_to_the_last() {
     // Drawing and marching by turns, into both kinds of targets, in several batches.
     let rays = plan(bumps(SampleFormat::Unorm8), rising(0.05), QuadratureRule::Gauss2, Mode::Exact);
     for target in [Target::Float32, Target::Float16, Target::Float32] {
-        let mut drawn = polygons(&rays, Placement::ObjectPlanes, target);
-        drawn.proxy = drawn.proxy.map(|proxy| Arc::new(Arc::unwrap_or_clone(proxy).in_batches_of(20)));
+        let drawn = polygons(&rays, Placement::ObjectPlanes, target).in_batches_of(20);
         backend.render(&drawn).unwrap();
         backend.render(&rays).unwrap();
     }
@@ -42,10 +41,9 @@ fn exercise(backend: &mut AshBackend, plan: &FramePlan) {
     let render = |backend: &mut AshBackend, plan: &FramePlan| backend.render(plan).unwrap();
     render(backend, plan);
     render(backend, plan);
-    let mut wide = plan.clone();
-    wide.rays.size = UVec2::new(70, 30);
-    render(backend, &wide);
+    render(backend, &of_size(plan, UVec2::new(70, 30)));
     render(backend, &nothing(plan));
+    render(backend, &with_visible(&nothing(plan), *plan.domain()));
     for function in ShaderFunction::ALL {
         backend.evaluate(plan, function, &[[0.5; 4]; 100]).unwrap();
     }

@@ -17,7 +17,7 @@ use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, PlanRay};
 use brickfield_optics::{Segment, alpha, transmittance};
 
 use super::change::{Values, difference, spread};
-use super::field::{Field, Stored};
+use super::field::Field;
 use super::straying::straying;
 use super::walk::{Part, clip, middle, parts, segments, whole};
 use super::{part_values, relative, segment};
@@ -40,29 +40,29 @@ pub(super) struct Ambiguity {
 }
 
 impl Ambiguity {
-    pub(super) fn new<S: Stored>(field: &Field<S>) -> Ambiguity {
-        let knots = field.plan.transfer.knots();
+    pub(super) fn new(field: &impl Field) -> Ambiguity {
+        let knots = field.plan().transfer().knots();
         let optics = |i: usize| (knots[i].extinction, knots[i].color);
         let jump = |i: &usize| knots[*i].value == knots[i + 1].value && optics(*i) != optics(i + 1);
         Ambiguity {
-            several_kinds: has_several_kinds(field.plan),
+            several_kinds: has_several_kinds(field.plan()),
             jumps: (0..knots.len() - 1).filter(jump).map(|i| knots[i].value).collect(),
             max_extinction: knots.iter().map(|k| k.extinction).fold(0.0, f64::max),
-            coarsest: entries(field.plan).filter_map(resident_level).max().unwrap_or(Level(0)),
+            coarsest: coarsest(field.plan()),
         }
     }
 
     /// The most by which a channel of the ray's pixel may change.
-    pub(super) fn of_ray<S: Stored>(&self, field: &Field<S>, at: UVec2, ray: &PlanRay) -> f64 {
-        let plan = field.plan;
-        let domain = relative(&plan.domain, plan.rays.center);
+    pub(super) fn of_ray(&self, field: &impl Field, at: UVec2, ray: &PlanRay) -> f64 {
+        let plan = field.plan();
+        let domain = relative(plan.domain(), plan.rays().center);
         let far = domain.extent().length() / ray.direction.length() + ray.t_anchor.abs();
-        let delta = plan.rays.rounding(at.x, at.y, ray, far);
+        let delta = plan.rays().rounding(at.x, at.y, ray, far);
         match clip(ray, &domain, ray.t_eye) {
             Some(_) if clip(ray, &grown(&domain, -delta), ray.t_eye).is_none() => self.grazing(ray, &domain, delta),
             None => self.grazing(ray, &domain, delta),
             Some(span) => {
-                let delta = plan.rays.rounding(at.x, at.y, ray, span.start.abs().max(span.end.abs()));
+                let delta = plan.rays().rounding(at.x, at.y, ray, span.start.abs().max(span.end.abs()));
                 self.inside(field, ray, span, delta)
             }
         }
@@ -74,8 +74,8 @@ impl Ambiguity {
         span.map_or(0.0, |span| alpha(self.max_extinction * (span.end - span.start)))
     }
 
-    fn inside<S: Stored>(&self, field: &Field<S>, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
-        let sampling = &field.plan.sampling;
+    fn inside(&self, field: &impl Field, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
+        let sampling = &field.plan().sampling();
         let appearing = match sampling.lengths() {
             Lengths::True => 0.0,
             Lengths::Nominal => self.appearing(field, ray, span, delta),
@@ -93,12 +93,12 @@ impl Ambiguity {
     }
 
     /// The change by nodes that fall on the other side of a jump.
-    fn changing<S: Stored>(&self, field: &Field<S>, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
-        let plan = field.plan;
+    fn changing(&self, field: &impl Field, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
+        let plan = field.plan();
         let (mut bound, mut least_depth) = (0.0, 0.0);
-        let rule = plan.sampling.rule();
+        let rule = plan.sampling().rule();
         for part in parts(plan, ray, span) {
-            let at = |x: f64| plan.rays.center + ray.at(part.at(x));
+            let at = |x: f64| plan.rays().center + ray.at(part.at(x));
             if !rule.nodes().iter().any(|x| self.may_be_close(field, part, at(*x), delta)) {
                 least_depth += segment(plan, part_values(field, ray, part), part.length).depth;
                 continue;
@@ -113,10 +113,10 @@ impl Ambiguity {
 
     /// The change by segments of nominal length whose middle is within rounding of where what is divided ends: they may count
     /// or not.
-    fn appearing<S: Stored>(&self, field: &Field<S>, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
-        let plan = field.plan;
+    fn appearing(&self, field: &impl Field, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
+        let plan = field.plan();
         let of = |span: Span, b: Aabb, level: Level, cell| {
-            let nominal = plan.sampling.step_world() * f64::from(level.stride());
+            let nominal = plan.sampling().step_world() * f64::from(level.stride());
             let step = nominal * ray.stretch;
             let beside = Span { start: span.start - 0.5 * step, end: span.end + 0.5 * step };
             let doubtful = segments(beside, step).filter(|s| is_at_surface(ray.at(middle(s)), &b, delta));
@@ -127,45 +127,45 @@ impl Ambiguity {
             };
             doubtful.map(segment).sum::<f64>()
         };
-        match plan.sampling.division() {
-            Division::Ray => of(span, relative(&plan.domain, plan.rays.center), Level(0), None),
+        match plan.sampling().division() {
+            Division::Ray => of(span, relative(plan.domain(), plan.rays().center), Level(0), None),
             Division::Brick => Blocks::new(plan, ray, span)
-                .map(|c| of(c.span, plan.block_box(c.cell), c.entry.level(), Some(c.cell)))
+                .map(|c| of(c.span, plan.block_box(c.cell), plan.field().level_at(c.cell), Some(c.cell)))
                 .sum(),
         }
     }
 
     /// Whether a node at `q` could be close to a jump; quick, and never wrongly no.
-    fn may_be_close<S: Stored>(&self, field: &Field<S>, part: Part, q: DVec3, delta: DVec3) -> bool {
+    fn may_be_close(&self, field: &impl Field, part: Part, q: DVec3, delta: DVec3) -> bool {
         let q = field.clamped(q);
-        let at_face = || part.cell.is_none() && field.index_cell(q - delta) != field.index_cell(q + delta);
+        let at_face = || part.cell.is_none() && field.cell_at(q - delta) != field.cell_at(q + delta);
         !self.jumps.is_empty() || at_face()
     }
 
     /// The values that a node of `part` at `q` may have.
-    fn values<S: Stored>(&self, field: &Field<S>, part: Part, q: DVec3, delta: DVec3) -> Values {
+    fn values(&self, field: &impl Field, part: Part, q: DVec3, delta: DVec3) -> Values {
         let q = field.clamped(q);
-        let own = part.cell.unwrap_or_else(|| field.index_cell(q));
-        let mut values = vec![field.in_block(own, q)];
+        let own = part.cell.unwrap_or_else(|| field.cell_at(q));
+        let mut values = vec![field.value(&field.patch_of(own), q)];
         self.beyond_jumps(field, own, q, delta, &mut values);
         if !self.several_kinds || part.cell.is_some() {
             return values;
         }
-        let kind = |c: UVec3| Kind::of(field.plan.index.at(c));
-        let (low, high) = (field.index_cell(q - delta), field.index_cell(q + delta));
+        let kind = |c: UVec3| Kind::of(field.plan(), c);
+        let (low, high) = (field.cell_at(q - delta), field.cell_at(q + delta));
         for cell in cells(low, high).filter(|c| kind(*c) != kind(own)) {
-            values.push(field.in_block(cell, q));
+            values.push(field.value(&field.patch_of(cell), q));
             self.beyond_jumps(field, cell, q, delta, &mut values);
         }
         values
     }
 
     /// Adds both sides of the jumps that the value in `cell` is close to.
-    fn beyond_jumps<S: Stored>(&self, field: &Field<S>, cell: UVec3, q: DVec3, delta: DVec3, values: &mut Values) {
-        let (false, Some(at)) = (self.jumps.is_empty(), field.interpolation_cell(cell, q)) else { return };
-        let Some(value) = field.in_block(cell, q) else { return };
+    fn beyond_jumps(&self, field: &impl Field, cell: UVec3, q: DVec3, delta: DVec3, values: &mut Values) {
+        let (false, Some(at)) = (self.jumps.is_empty(), field.around(&field.patch_of(cell), q)) else { return };
+        let Some(value) = field.value(&field.patch_of(cell), q) else { return };
         let (gain, (min, max)) = (field.gain(), at.range());
-        let offset = field.plan.bricks.decode().offset;
+        let offset = field.plan().field().slots().decode().offset;
         let magnitude = gain * min.abs().max(max.abs()) + offset.abs() + self.jumps[0].abs();
         let reach = gain * (max - min) * delta.element_sum() + ROUNDING * magnitude;
         for jump in self.jumps.iter().filter(|j| (value - **j).abs() <= reach) {
@@ -184,36 +184,29 @@ fn grown(b: &Aabb, delta: DVec3) -> Aabb {
     Aabb { min: b.min - delta, max: b.max + delta }
 }
 
-/// What the field is like in a block. Where the kind changes it may jump: a transparent block does not say of which level
-/// its bricks were.
+/// The kind of a block. Where it changes the field may jump: an empty block does not say of which level its samples were.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Resident(Level),
-    Transparent,
+    Empty,
 }
 
 impl Kind {
-    fn of(entry: IndexEntry) -> Kind {
-        match entry {
-            IndexEntry::Resident { level, .. } => Kind::Resident(level),
-            IndexEntry::Transparent { .. } => Kind::Transparent,
+    fn of(plan: &FramePlan, cell: UVec3) -> Kind {
+        match plan.field().index().at(cell) {
+            IndexEntry::Resident { .. } => Kind::Resident(plan.field().level_at(cell)),
+            IndexEntry::Empty { .. } => Kind::Empty,
         }
     }
 }
 
-fn entries(plan: &FramePlan) -> impl Iterator<Item = IndexEntry> {
-    plan.index.words().iter().map(|w| IndexEntry::unpack(*w))
-}
-
-fn resident_level(entry: IndexEntry) -> Option<Level> {
-    match entry {
-        IndexEntry::Resident { level, .. } => Some(level),
-        IndexEntry::Transparent { .. } => None,
-    }
+fn coarsest(plan: &FramePlan) -> Level {
+    let all = cells(UVec3::ZERO, plan.field().index().dims() - 1);
+    all.map(|cell| plan.field().level_at(cell)).max().unwrap_or(Level(0))
 }
 
 fn has_several_kinds(plan: &FramePlan) -> bool {
-    let mut kinds = entries(plan).map(Kind::of);
+    let mut kinds = cells(UVec3::ZERO, plan.field().index().dims() - 1).map(|cell| Kind::of(plan, cell));
     let first = kinds.next();
     kinds.any(|k| Some(k) != first)
 }

@@ -1,14 +1,14 @@
-//! The field that a plan describes: bricks found through the index, interpolated in f64.
+//! The field that a plan describes, evaluated in f64: the same questions that shaders ask of `package::field`.
 
 use std::marker::PhantomData;
 
-use brickfield_core::Level;
+use brickfield_core::Place;
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_frame::{FramePlan, IndexEntry};
 
-/// How a sample is read from the bytes of a brick set.
+/// How a sample is read from a slot's bytes.
 pub(super) trait Stored: Sync {
-    /// The stored number of sample `i`.
+    /// The stored number of sample `i` of a slot.
     fn read(bytes: &[u8], i: usize) -> f64;
 }
 
@@ -38,12 +38,56 @@ impl Stored for Float32 {
     }
 }
 
-/// The field of a plan.
-pub(super) struct Field<'a, S> {
-    pub(super) plan: &'a FramePlan,
-    last: DVec3,
-    n: usize,
-    stored: PhantomData<S>,
+/// A field: from a position to the patch that owns it, and to the value there.
+pub(super) trait Field: Sync {
+    /// The plan whose field it is.
+    fn plan(&self) -> &FramePlan;
+
+    /// The patch around an index cell.
+    fn patch_of(&self, cell: UVec3) -> Patch;
+
+    /// The samples that a patch has around a clamped position; `None` if it is empty.
+    fn around(&self, patch: &Patch, q: DVec3) -> Option<Cell>;
+
+    /// The position that the field is evaluated at.
+    #[inline]
+    fn clamped(&self, q: DVec3) -> DVec3 {
+        q.clamp(DVec3::ZERO, self.plan().field().last_sample())
+    }
+
+    /// The index cell that owns a position.
+    #[inline]
+    fn cell_at(&self, q: DVec3) -> UVec3 {
+        self.plan().field().cell_at(q)
+    }
+
+    /// The data value that a patch has at a clamped position; `None` if it is empty.
+    #[inline]
+    fn value(&self, patch: &Patch, q: DVec3) -> Option<f64> {
+        let cell = self.around(patch, q)?;
+        let slots = self.plan().field().slots();
+        Some(slots.decode().value(trilinear(&cell) / slots.format().unit()))
+    }
+
+    /// The data value at a sample position; `None` where its patch is empty.
+    #[inline]
+    fn value_at(&self, q: DVec3) -> Option<f64> {
+        let q = self.clamped(q);
+        self.value(&self.patch_of(self.cell_at(q)), q)
+    }
+
+    /// Data values between two stored numbers, without sign.
+    fn gain(&self) -> f64 {
+        let slots = self.plan().field().slots();
+        (slots.decode().scale / slots.format().unit()).abs()
+    }
+}
+
+/// A part of a field with one way to fetch its values.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Patch {
+    /// Its slot and where that one's samples lie; `None` if nothing is visible there.
+    slot: Option<(u32, Place)>,
 }
 
 /// The eight samples around a position, and where it lies between them.
@@ -61,68 +105,57 @@ impl Cell {
     }
 }
 
-impl<'a, S: Stored> Field<'a, S> {
+/// A field whose slots share their border samples ([`Join::Shared`](brickfield_frame::Join::Shared)): every value is one slot's.
+pub(super) struct Shared<'a, S> {
+    plan: &'a FramePlan,
+    stored: PhantomData<S>,
+}
+
+impl<'a, S: Stored> Shared<'a, S> {
     pub(super) fn new(plan: &'a FramePlan) -> Self {
-        let n = plan.bricks.side().n_samples() as usize;
-        Field { plan, last: plan.last_sample(), n, stored: PhantomData }
+        Shared { plan, stored: PhantomData }
     }
+}
 
-    /// The data value at a sample position; `None` where its block is transparent.
+impl<S: Stored> Field for Shared<'_, S> {
     #[inline]
-    pub(super) fn at(&self, q: DVec3) -> Option<f64> {
-        let q = self.clamped(q);
-        let cell = self.index_cell(q);
-        self.in_block(cell, q)
+    fn plan(&self) -> &FramePlan {
+        self.plan
     }
 
-    /// Data values between two stored numbers, without sign.
-    pub(super) fn gain(&self) -> f64 {
-        (self.plan.bricks.decode().scale / self.plan.bricks.format().unit()).abs()
-    }
-
-    /// The position that the field is evaluated at.
     #[inline]
-    pub(super) fn clamped(&self, q: DVec3) -> DVec3 {
-        q.clamp(DVec3::ZERO, self.last)
+    fn patch_of(&self, cell: UVec3) -> Patch {
+        let field = self.plan.field();
+        let IndexEntry::Resident { slot, .. } = field.index().at(cell) else { return Patch { slot: None } };
+        Patch { slot: field.place_at(cell).map(|place| (slot, place)) }
     }
 
-    /// The index cell that owns a clamped position.
     #[inline]
-    pub(super) fn index_cell(&self, q: DVec3) -> UVec3 {
-        // Truncation is floor where it is not negative, and 0 below.
-        let cell = (q / (self.n - 1) as f64).as_uvec3();
-        cell.min(self.plan.index.dims() - 1)
+    fn around(&self, patch: &Patch, q: DVec3) -> Option<Cell> {
+        let (slot, place) = patch.slot?;
+        let bytes = self.plan.field().slots().samples(slot)?.bytes();
+        let last = place.n_in_space() - 1;
+        let s = place.local(q).clamp(DVec3::ZERO, last.as_dvec3());
+        let i = s.as_uvec3().min(last.saturating_sub(UVec3::ONE));
+        let strides = strides(&place);
+        let base: usize = (0..3).map(|axis| i[axis] as usize * strides[axis]).sum();
+        // Along an axis with a single sample there is no neighbour.
+        let next = [0, 1, 2].map(|axis| if last[axis] > 0 { strides[axis] } else { 0 });
+        let corner = |c: usize| (c & 1) * next[0] + (c >> 1 & 1) * next[1] + (c >> 2) * next[2];
+        let samples = std::array::from_fn(|c| S::read(bytes, base + corner(c)));
+        Some(Cell { samples, fraction: s - i.as_dvec3() })
     }
+}
 
-    /// The data value at a clamped position, as the block around index cell `cell` has it.
-    #[inline]
-    pub(super) fn in_block(&self, cell: UVec3, q: DVec3) -> Option<f64> {
-        let cell = self.interpolation_cell(cell, q)?;
-        let read = trilinear(&cell) / self.plan.bricks.format().unit();
-        Some(self.plan.bricks.decode().value(read))
+/// How many samples neighbours along each axis of space are apart in a slot.
+#[inline]
+fn strides(place: &Place) -> [usize; 3] {
+    let of_texture = [1, place.n.x as usize, place.n.x as usize * place.n.y as usize];
+    let mut strides = [0; 3];
+    for (axis, of_space) in place.axes.of_texture().into_iter().enumerate() {
+        strides[of_space] = of_texture[axis];
     }
-
-    /// The eight samples that the block around `cell` has for a clamped position.
-    #[inline]
-    pub(super) fn interpolation_cell(&self, cell: UVec3, q: DVec3) -> Option<Cell> {
-        let IndexEntry::Resident { slot, level } = self.plan.index.at(cell) else { return None };
-        let s = self.in_brick(cell, level, q);
-        let i = s.as_uvec3().min(UVec3::splat(self.n as u32 - 2));
-        let base = slot as usize * self.n.pow(3) + i.x as usize + self.n * (i.y as usize + self.n * i.z as usize);
-        let sample = |c: usize| S::read(self.plan.bricks.bytes(), base + self.corner(c));
-        Some(Cell { samples: std::array::from_fn(sample), fraction: s - i.as_dvec3() })
-    }
-
-    /// The position in the brick's own samples, [0, n - 1].
-    fn in_brick(&self, cell: UVec3, level: Level, q: DVec3) -> DVec3 {
-        let n_cells = (self.n - 1) as f64;
-        let corner = (cell >> u32::from(level.0) << u32::from(level.0)).as_dvec3() * n_cells;
-        ((q - corner) / f64::from(level.stride())).clamp(DVec3::ZERO, DVec3::splat(n_cells))
-    }
-
-    fn corner(&self, c: usize) -> usize {
-        (c & 1) + self.n * ((c >> 1 & 1) + self.n * (c >> 2))
-    }
+    strides
 }
 
 /// Linear along x, then y, then z.

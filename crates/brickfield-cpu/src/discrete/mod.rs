@@ -17,7 +17,7 @@ use brickfield_optics::{QuadratureRule, RayState, Segment};
 use rayon::prelude::*;
 
 use ambiguity::Ambiguity;
-use field::{Field, Float32, Stored, Unorm8, Unorm16};
+use field::{Field, Float32, Shared, Stored, Unorm8, Unorm16};
 pub use rounding::{filter_rounding, position_rounding};
 use walk::{Part, clip, parts};
 
@@ -44,17 +44,14 @@ pub struct Discrete {
 
 /// The sum that `plan` asks for, in f64.
 ///
-/// Same step, rule and cut as the plan's; its mode does not matter: no ray ends early, no block is jumped over. A node in a
-/// transparent block has extinction 0; with [`QuadratureRule::PreIntegrated`] a segment with such a node contributes
-/// nothing (transparent blocks have transparent neighbours there).
+/// Same step, rule and cut as the plan's; its mode does not matter: no ray ends early, no block is jumped over. A node in an
+/// empty block has extinction 0; with [`QuadratureRule::PreIntegrated`] a segment with such a node contributes
+/// nothing (empty blocks have neighbours without extinction there).
 ///
 /// Accuracy: that of f64, about 1e-15 times the number of segments of a ray. Cost: about 0.16 us a sample and core,
 /// 0.4 us where several levels, jumps or bricks' own segments make pixels ambiguous.
-///
-/// # Panics
-/// If the index names a slot that the plan's bricks do not have: such a plan is not valid.
 pub fn discrete(plan: &FramePlan) -> Discrete {
-    match plan.bricks.format() {
+    match plan.field().slots().format() {
         SampleFormat::Unorm8 => render::<Unorm8>(plan),
         SampleFormat::Unorm16 => render::<Unorm16>(plan),
         SampleFormat::Float32 => render::<Float32>(plan),
@@ -72,7 +69,7 @@ struct Pixel {
 }
 
 fn render<S: Stored>(plan: &FramePlan) -> Discrete {
-    let field = Field::<S>::new(plan);
+    let field = Shared::<S>::new(plan);
     let ambiguity = Ambiguity::new(&field);
     let size = plan.size();
     let row = |y: u32| (0..size.x).map(|x| pixel(&field, &ambiguity, UVec2::new(x, y))).collect::<Vec<_>>();
@@ -91,22 +88,22 @@ fn render<S: Stored>(plan: &FramePlan) -> Discrete {
     }
 }
 
-fn pixel<S: Stored>(field: &Field<S>, ambiguity: &Ambiguity, at: UVec2) -> Pixel {
-    let ray = field.plan.rays.ray(at.x, at.y);
+fn pixel(field: &impl Field, ambiguity: &Ambiguity, at: UVec2) -> Pixel {
+    let ray = field.plan().rays().ray(at.x, at.y);
     let own = along(field, &ray);
-    let across = field.plan.rays.ray_across_tie(at.x, at.y, ambiguity::TIE).map(|other| along(field, &other));
+    let across = field.plan().rays().ray_across_tie(at.x, at.y, ambiguity::TIE).map(|other| along(field, &other));
     let tie = across.map_or(0.0, |other| greatest_difference(&own.rgba, &other.rgba));
     Pixel { ambiguity: ambiguity.of_ray(field, at, &ray) + tie, ..own }
 }
 
 /// The sum along a ray.
-fn along<S: Stored>(field: &Field<S>, ray: &PlanRay) -> Pixel {
-    let (plan, mut pixel) = (field.plan, Pixel::default());
-    let Some(span) = clip(ray, &relative(&plan.domain, plan.rays.center), ray.t_eye) else { return pixel };
+fn along(field: &impl Field, ray: &PlanRay) -> Pixel {
+    let (plan, mut pixel) = (field.plan(), Pixel::default());
+    let Some(span) = clip(ray, &relative(plan.domain(), plan.rays().center), ray.t_eye) else { return pixel };
     let mut state = RayState::default();
     for part in parts(plan, ray, span) {
         let values = part_values(field, ray, part);
-        pixel.n_samples += plan.sampling.rule().nodes().len() as u64;
+        pixel.n_samples += plan.sampling().rule().nodes().len() as u64;
         let segment = segment(plan, values, part.length);
         if segment.depth > 0.0 {
             pixel.n_visible_samples += n_visible(field, &values);
@@ -123,17 +120,17 @@ fn greatest_difference(a: &[f64; 4], b: &[f64; 4]) -> f64 {
 }
 
 /// The values at the nodes of a segment.
-fn part_values<S: Stored>(field: &Field<S>, ray: &PlanRay, part: Part) -> [Option<f64>; 2] {
-    node_values(field.plan.sampling.rule(), |x| {
-        let q = field.plan.rays.center + ray.at(part.at(x));
+fn part_values(field: &impl Field, ray: &PlanRay, part: Part) -> [Option<f64>; 2] {
+    node_values(field.plan().sampling().rule(), |x| {
+        let q = field.plan().rays().center + ray.at(part.at(x));
         match part.cell {
-            Some(cell) => field.in_block(cell, field.clamped(q)),
-            None => field.at(q),
+            Some(cell) => field.value(&field.patch_of(cell), field.clamped(q)),
+            None => field.value_at(q),
         }
     })
 }
 
-/// The values at a rule's nodes, `None` in transparent blocks (and for the second node of a rule that has one).
+/// The values at a rule's nodes, `None` in empty blocks (and for the second node of a rule that has one).
 fn node_values(rule: QuadratureRule, at: impl Fn(f64) -> Option<f64>) -> [Option<f64>; 2] {
     let nodes = rule.nodes();
     [at(nodes[0]), nodes.get(1).and_then(|x| at(*x))]
@@ -141,27 +138,27 @@ fn node_values(rule: QuadratureRule, at: impl Fn(f64) -> Option<f64>) -> [Option
 
 /// A segment whose nodes have the given values; `None`: extinction 0.
 fn segment(plan: &FramePlan, values: [Option<f64>; 2], length_world: f64) -> Segment {
-    let rule = plan.sampling.rule();
+    let rule = plan.sampling().rule();
     match (values, rule) {
         ([None, None], _) => Segment::default(),
-        ([Some(a), Some(b)], _) => rule.segment(&plan.transfer, &[a, b], length_world),
+        ([Some(a), Some(b)], _) => rule.segment(plan.transfer(), &[a, b], length_world),
         ([Some(v), None] | [None, Some(v)], QuadratureRule::Gauss2) => one_gauss_node(plan, v, length_world),
         (_, QuadratureRule::PreIntegrated) => Segment::default(),
-        ([Some(v), None] | [None, Some(v)], _) => rule.segment(&plan.transfer, &[v], length_world),
+        ([Some(v), None] | [None, Some(v)], _) => rule.segment(plan.transfer(), &[v], length_world),
     }
 }
 
 /// A two-point Gauss segment whose other node has extinction 0: half the depth, all of the node's colour.
 fn one_gauss_node(plan: &FramePlan, value: f64, length_world: f64) -> Segment {
-    QuadratureRule::MidpointExponential.segment(&plan.transfer, &[value], 0.5 * length_world)
+    QuadratureRule::MidpointExponential.segment(plan.transfer(), &[value], 0.5 * length_world)
 }
 
 /// How many nodes of a visible segment have an extinction above 0.
-fn n_visible<S: Stored>(field: &Field<S>, values: &[Option<f64>; 2]) -> u64 {
-    if field.plan.sampling.rule().nodes().len() == 1 {
+fn n_visible(field: &impl Field, values: &[Option<f64>; 2]) -> u64 {
+    if field.plan().sampling().rule().nodes().len() == 1 {
         return 1;
     }
-    values.iter().flatten().filter(|v| field.plan.transfer.at(**v).extinction > 0.0).count() as u64
+    values.iter().flatten().filter(|v| field.plan().transfer().at(**v).extinction > 0.0).count() as u64
 }
 
 fn relative(b: &Aabb, center: DVec3) -> Aabb {

@@ -24,7 +24,7 @@ use brickfield_optics::transmittance;
 use rayon::prelude::*;
 
 use super::change::{Values, spread};
-use super::field::{Field, Float32, Stored, Unorm8, Unorm16};
+use super::field::{Field, Float32, Shared, Stored, Unorm8, Unorm16};
 use super::relative;
 use super::walk::{Part, clip, parts};
 
@@ -38,9 +38,6 @@ const SECOND_ORDER: f64 = 1.05;
 /// For each pixel, rows from the top: what one rounding of each term of its nodes' positions may change, in any channel.
 ///
 /// Cost: several times that of [`discrete`](crate::discrete()).
-///
-/// # Panics
-/// As [`discrete`](crate::discrete()).
 pub fn position_rounding(plan: &FramePlan) -> Vec<f64> {
     of_plan(plan, Cause::Positions)
 }
@@ -49,9 +46,6 @@ pub fn position_rounding(plan: &FramePlan) -> Vec<f64> {
 /// channel.
 ///
 /// Cost: several times that of [`discrete`](crate::discrete()).
-///
-/// # Panics
-/// As [`discrete`](crate::discrete()).
 pub fn filter_rounding(plan: &FramePlan, sub_texel_bits: u32) -> Vec<f64> {
     of_plan(plan, Cause::Filter { sub_texel_bits })
 }
@@ -64,7 +58,7 @@ enum Cause {
 }
 
 fn of_plan(plan: &FramePlan, cause: Cause) -> Vec<f64> {
-    match plan.bricks.format() {
+    match plan.field().slots().format() {
         SampleFormat::Unorm8 => of_picture::<Unorm8>(plan, cause),
         SampleFormat::Unorm16 => of_picture::<Unorm16>(plan, cause),
         SampleFormat::Float32 => of_picture::<Float32>(plan, cause),
@@ -72,23 +66,24 @@ fn of_plan(plan: &FramePlan, cause: Cause) -> Vec<f64> {
 }
 
 fn of_picture<S: Stored>(plan: &FramePlan, cause: Cause) -> Vec<f64> {
-    let (field, size): (Field<S>, UVec2) = (Field::new(plan), plan.size());
+    let (field, size) = (Shared::<S>::new(plan), plan.size());
     let pixel = |i: u32| of_pixel(&field, UVec2::new(i % size.x, i / size.x), cause);
     (0..size.x * size.y).into_par_iter().map(pixel).collect()
 }
 
-fn of_pixel<S: Stored>(field: &Field<S>, at: UVec2, cause: Cause) -> f64 {
-    let (plan, ray) = (field.plan, &field.plan.rays.ray(at.x, at.y));
-    let Some(span) = clip(ray, &relative(&plan.domain, plan.rays.center), ray.t_eye) else { return 0.0 };
-    let delta = plan.rays.rounding(at.x, at.y, ray, span.start.abs().max(span.end.abs())) / AT_WORST;
+fn of_pixel(field: &impl Field, at: UVec2, cause: Cause) -> f64 {
+    let plan = field.plan();
+    let ray = &plan.rays().ray(at.x, at.y);
+    let Some(span) = clip(ray, &relative(plan.domain(), plan.rays().center), ray.t_eye) else { return 0.0 };
+    let delta = plan.rays().rounding(at.x, at.y, ray, span.start.abs().max(span.end.abs())) / AT_WORST;
     let stray = |range: f64, stride: f64| match cause {
         Cause::Positions => range * delta.element_sum() / stride,
         Cause::Filter { sub_texel_bits } => filtered(field, range, sub_texel_bits),
     };
     let (mut bound, mut least_depth) = (0.0, 0.0);
     for part in parts(plan, ray, span) {
-        let values = |x: &f64| values(field, part, plan.rays.center + ray.at(part.at(*x)), stray);
-        let nodes: Vec<Values> = plan.sampling.rule().nodes().iter().map(values).collect();
+        let values = |x: &f64| values(field, part, plan.rays().center + ray.at(part.at(*x)), stray);
+        let nodes: Vec<Values> = plan.sampling().rule().nodes().iter().map(values).collect();
         let (change, least) = spread(plan, &nodes, part);
         bound += transmittance(least_depth) * change;
         least_depth += least;
@@ -97,25 +92,26 @@ fn of_pixel<S: Stored>(field: &Field<S>, at: UVec2, cause: Cause) -> f64 {
 }
 
 /// How far filtering may move a value between samples of a range, in data values.
-fn filtered<S: Stored>(field: &Field<S>, range: f64, bits: u32) -> f64 {
+fn filtered(field: &impl Field, range: f64, bits: u32) -> f64 {
     let weights = 3.0 * (-f64::from(bits)).exp2() * range;
-    let by_code = field.plan.bricks.format() == SampleFormat::Unorm8 && bits < f32::MANTISSA_DIGITS - 1;
+    let by_code = field.plan().field().slots().format() == SampleFormat::Unorm8 && bits < f32::MANTISSA_DIGITS - 1;
     let code = if by_code { CODES * field.gain() } else { 0.0 };
     // Interpolation never leaves the cell's range by more than a code.
     (weights + code).min(range + code)
 }
 
-/// The values that a node at `q` may have; none where its block is transparent. `stray` takes the range of the samples around it, in
+/// The values that a node at `q` may have; none where its block is empty. `stray` takes the range of the samples around it, in
 /// data values, and how many voxels they are apart.
-fn values<S: Stored>(field: &Field<S>, part: Part, q: DVec3, stray: impl Fn(f64, f64) -> f64) -> Values {
+fn values(field: &impl Field, part: Part, q: DVec3, stray: impl Fn(f64, f64) -> f64) -> Values {
     let q = field.clamped(q);
-    let cell = part.cell.unwrap_or_else(|| field.index_cell(q));
-    let (Some(value), Some(at)) = (field.in_block(cell, q), field.interpolation_cell(cell, q)) else {
+    let cell = part.cell.unwrap_or_else(|| field.cell_at(q));
+    let patch = field.patch_of(cell);
+    let (Some(value), Some(at)) = (field.value(&patch, q), field.around(&patch, q)) else {
         return vec![None];
     };
-    let stride = f64::from(field.plan.index.at(cell).level().stride());
+    let stride = f64::from(field.plan().field().level_at(cell).stride());
     let (min, max) = at.range();
-    candidates(&field.plan.transfer, value, stray(field.gain() * (max - min), stride))
+    candidates(&field.plan().transfer(), value, stray(field.gain() * (max - min), stride))
 }
 
 /// The values at which extinction and colour are extreme: the node's own first, the ends, and both sides of knots between.

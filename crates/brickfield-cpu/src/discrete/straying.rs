@@ -11,7 +11,7 @@ use brickfield_frame::{FramePlan, PlanRay};
 use brickfield_optics::{Segment, transmittance};
 
 use super::change::difference;
-use super::field::{Field, Stored};
+use super::field::Field;
 use super::walk::{Part, parts_in_block, segments};
 use super::{part_values, segment};
 use crate::blocks::{Blocks, Crossing};
@@ -34,21 +34,21 @@ struct Light {
 }
 
 /// The most by which a channel of the ray's pixel may change if its positions are off by `delta`.
-pub(super) fn straying<S: Stored>(
-    field: &Field<S>,
+pub(super) fn straying(
+    field: &impl Field,
     ray: &PlanRay,
     span: Span,
     delta: DVec3,
     (max_extinction, coarsest): (f64, Level),
 ) -> f64 {
-    let plan = field.plan;
+    let plan = field.plan();
     let own: Vec<Crossing> = Blocks::new(plan, ray, span).collect();
     let along = |c: &Crossing| along_faces(ray, &plan.block_box(c.cell), c.span, delta, LITTLE / max_extinction);
     let alongs: Vec<Vec<Span>> = own.iter().map(along).collect();
     if alongs.iter().all(Vec::is_empty) {
         return 0.0;
     }
-    let step = plan.sampling.step_world() * f64::from(coarsest.stride()) * ray.stretch;
+    let step = plan.sampling().step_world() * f64::from(coarsest.stride()) * ray.stretch;
     let (mut bound, mut least_depth) = (0.0, 0.0f64);
     for (crossing, alongs) in own.iter().zip(&alongs) {
         let depth = light(field, ray, &own, crossing.span).sum.depth;
@@ -89,8 +89,8 @@ fn ways_beside(plan: &FramePlan, ray: &PlanRay, along: Span, delta: DVec3) -> Ve
 }
 
 /// What changes along a span if its blocks are crossed in any of other ways.
-fn change_along<S: Stored>(
-    field: &Field<S>,
+fn change_along(
+    field: &impl Field,
     ray: &PlanRay,
     along: Span,
     step: f64,
@@ -115,12 +115,12 @@ fn change_along<S: Stored>(
 }
 
 /// The light of a piece of a ray that crosses blocks.
-fn light<S: Stored>(field: &Field<S>, ray: &PlanRay, crossings: &[Crossing], piece: Span) -> Light {
+fn light(field: &impl Field, ray: &PlanRay, crossings: &[Crossing], piece: Span) -> Light {
     let mut light = Light::default();
-    let of = |part: Part| segment(field.plan, part_values(field, ray, part), part.length);
+    let of = |part: Part| segment(field.plan(), part_values(field, ray, part), part.length);
     for crossing in crossings {
         let span = Span { start: piece.start.max(crossing.span.start), end: piece.end.min(crossing.span.end) };
-        for part in parts_in_block(field.plan, ray, span, crossing.cell) {
+        for part in parts_in_block(field.plan(), ray, span, crossing.cell) {
             let (whole, mut halves) = (of(part), Segment::default());
             part.halves().into_iter().for_each(|half| push(&mut halves, &of(half)));
             light.by_cut = light.by_cut.max(difference(&whole, &halves));

@@ -35,7 +35,7 @@ impl Part {
 
 /// The segments of a ray's span in the domain, front to back (ARCHITECTURE.md, rule 2).
 pub(super) fn parts(plan: &FramePlan, ray: &PlanRay, span: Span) -> Vec<Part> {
-    match plan.sampling.division() {
+    match plan.sampling().division() {
         Division::Ray => divided(plan, ray, span, Level(0), None),
         Division::Brick => {
             Blocks::new(plan, ray, span).flat_map(|c| parts_in_block(plan, ray, c.span, c.cell)).collect()
@@ -45,17 +45,17 @@ pub(super) fn parts(plan: &FramePlan, ray: &PlanRay, span: Span) -> Vec<Part> {
 
 /// The segments of a span, if all of it is in the block that has an index cell.
 pub(super) fn parts_in_block(plan: &FramePlan, ray: &PlanRay, span: Span, cell: UVec3) -> Vec<Part> {
-    match plan.index.at(cell) {
+    match plan.field().index().at(cell) {
         _ if span.start >= span.end => Vec::new(),
-        IndexEntry::Resident { level, .. } => divided(plan, ray, span, level, Some(cell)),
-        IndexEntry::Transparent { .. } => Vec::new(),
+        IndexEntry::Resident { .. } => divided(plan, ray, span, plan.field().level_at(cell), Some(cell)),
+        IndexEntry::Empty { .. } => Vec::new(),
     }
 }
 
 fn divided(plan: &FramePlan, ray: &PlanRay, span: Span, level: Level, cell: Option<UVec3>) -> Vec<Part> {
-    let nominal = plan.sampling.step_world() * f64::from(level.stride());
+    let nominal = plan.sampling().step_world() * f64::from(level.stride());
     let uncut = segments(span, nominal * ray.stretch);
-    match plan.sampling.lengths() {
+    match plan.sampling().lengths() {
         Lengths::True => uncut.filter_map(|s| cut(s, span, cell)).collect(),
         Lengths::Nominal => uncut.filter(|s| is_inside(middle(s), span)).map(|s| whole(s, nominal, cell)).collect(),
     }

@@ -81,11 +81,11 @@ const MOST: i64 = 1 << 23;
 #[inline(always)]
 pub(super) fn march<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
     let plan = scene.plan;
-    let domain = (plan.domain.min - scene.center, plan.domain.max - scene.center);
+    let domain = (plan.domain().min - scene.center, plan.domain().max - scene.center);
     let Some(span) = clip(ray, domain, ray.t_eye) else { return [0.0; 4] };
     let mut state = Ray32::default();
-    match plan.sampling.division() {
-        Division::Ray => along(scene, &Path::new(&plan.sampling, ray, span, Level(0)), runs, &mut state),
+    match plan.sampling().division() {
+        Division::Ray => along(scene, &Path::new(plan.sampling(), ray, span, Level(0)), runs, &mut state),
         Division::Brick => brick_by_brick(scene, ray, span, &mut state),
     }
     state.rgba()
@@ -98,9 +98,9 @@ fn floor(x: f64) -> i64 {
 /// The segments of some runs, block by block.
 #[inline(always)]
 fn along<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, runs: &[Range<i64>], state: &mut Ray32) {
-    let nodes = scene.plan.sampling.rule().nodes();
+    let nodes = scene.plan.sampling().rule().nodes();
     let (near, far) = (nodes[0], nodes[nodes.len() - 1]);
-    let floor = scene.plan.sampling.transmittance_floor();
+    let floor = scene.plan.sampling().transmittance_floor();
     for segments in runs {
         let (mut k, to) = (path.first.max(segments.start), path.end.min(segments.end));
         while k < to {
@@ -119,12 +119,13 @@ fn along<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, runs: &[Ra
 /// The segments of each brick.
 #[inline(always)]
 fn brick_by_brick<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRay, span: Span, state: &mut Ray32) {
-    let nodes = scene.plan.sampling.rule().nodes();
+    let nodes = scene.plan.sampling().rule().nodes();
     let nodes = (nodes[0], nodes[nodes.len() - 1]);
-    let floor = scene.plan.sampling.transmittance_floor();
+    let floor = scene.plan.sampling().transmittance_floor();
     for crossing in Blocks::new(scene.plan, ray, span) {
-        let IndexEntry::Resident { slot, level } = crossing.entry else { continue };
-        let path = Path::new(&scene.plan.sampling, ray, crossing.span, level);
+        let IndexEntry::Resident { slot, reach } = crossing.entry else { continue };
+        let level = reach.level_of_brick();
+        let path = Path::new(scene.plan.sampling(), ray, crossing.span, level);
         let block = scene.block_of(crossing.cell);
         let resident = Resident { block: &block, slot, level };
         state.push(single_in(scene, &path, &block, path.first));
@@ -159,7 +160,7 @@ fn one<const N: usize, S: Stored>(
     k: i64,
     value: impl Fn(DVec3) -> Option<f32>,
 ) -> Segment32 {
-    let rule = scene.plan.sampling.rule();
+    let rule = scene.plan.sampling().rule();
     let (start, length, weight) = path.segment(k);
     let value = |x: &f64| value(scene.center + path.ray.at(start + length * x));
     let nodes = rule.nodes();
@@ -180,8 +181,8 @@ fn run<const N: usize, S: Stored>(
     let block = scene.block(scene.center + path.ray.at(t));
     let exit = exit(scene, path, &block);
     let n = ((exit * path.per_unit - far).ceil() - k as f64).min((to.min(path.end - 1) - k).min(MOST) as f64) as i32;
-    if let (IndexEntry::Resident { slot, level }, true) = (block.entry, n > 0) {
-        Resident { block: &block, slot, level }.run(scene, path, k, (near, far), n, state);
+    if let (IndexEntry::Resident { slot, reach }, true) = (block.entry, n > 0) {
+        Resident { block: &block, slot, level: reach.level_of_brick() }.run(scene, path, k, (near, far), n, state);
     }
     // Rounding may have put the node into a block that the ray has left already.
     i64::from(n.max(0))
@@ -219,7 +220,7 @@ impl Resident<'_> {
         let far = (far - near) as f32;
         let brick = scene.brick(self.slot);
         let mut inner = Inner { brick, nodes, far, length: path.length, waiting: [0; 2 * LANES] };
-        match &scene.plan.occupancy {
+        match scene.plan.occupancy() {
             Some(occupancy) => {
                 inner.push_visible(scene, &Sieve::<N>::new(nodes, far, occupancy.brick(self.slot)), n, state);
             }
@@ -265,7 +266,7 @@ impl Inner<'_> {
                 *k = first + l as i32;
             }
             self.look(scene, ((n - first) as usize).min(LANES), state);
-            if state.transmittance < scene.plan.sampling.transmittance_floor() {
+            if state.transmittance < scene.plan.sampling().transmittance_floor() {
                 return;
             }
         }
@@ -294,7 +295,7 @@ impl Inner<'_> {
             }
             if n_waiting >= LANES {
                 self.look(scene, LANES, state);
-                if state.transmittance < scene.plan.sampling.transmittance_floor() {
+                if state.transmittance < scene.plan.sampling().transmittance_floor() {
                     return;
                 }
                 n_waiting -= LANES;
@@ -314,7 +315,7 @@ impl Inner<'_> {
         for (at, k) in at.iter_mut().zip(&self.waiting) {
             *at = *k as f32;
         }
-        let (rule, length) = (scene.plan.sampling.rule(), self.length);
+        let (rule, length) = (scene.plan.sampling().rule(), self.length);
         let near = scene.first_values(&self.nodes, self.brick, &at, n);
         match rule.nodes().len() {
             1 => batch::one_node(rule, &scene.transfer, &near, n, length, state),

@@ -14,7 +14,7 @@ use std::time::Instant;
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{BrickSide, Image};
 use brickfield_frame::{
-    Backend, Capabilities, Description, Frame, FramePlan, IndexEntry, RenderError, SampleFormat, ShaderFunction,
+    Backend, Capabilities, Description, Evaluate, Frame, FramePlan, Places, RenderError, SampleFormat, ShaderFunction,
     Timing, check_memory,
 };
 use rayon::prelude::*;
@@ -37,18 +37,15 @@ pub struct CpuBackend {
 impl CpuBackend {
     /// The backend for this machine.
     pub fn new() -> CpuBackend {
+        let mut capabilities = Capabilities::UNLIMITED;
+        capabilities.max_image = MAX_IMAGE;
         CpuBackend {
-            description: Description {
-                backend: "cpu",
-                adapter: cpu_model(),
-                driver: format!("{} threads, {}", rayon::current_num_threads(), instruction_set()),
-                capabilities: Capabilities {
-                    max_texture_3d: u32::MAX,
-                    max_image: MAX_IMAGE,
-                    max_buffer_bytes: isize::MAX as u64,
-                    sub_texel_bits: 23,
-                },
-            },
+            description: Description::new(
+                "cpu",
+                cpu_model(),
+                format!("{} threads, {}", rayon::current_num_threads(), instruction_set()),
+                capabilities,
+            ),
         }
     }
 }
@@ -73,14 +70,20 @@ impl Backend for CpuBackend {
     fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
         check(plan)?;
         check_memory(plan.size())?;
-        if plan.visible.is_empty() || plan.domain.is_empty() {
-            return Ok(Frame { image: Image::transparent(plan.size()), timing: Timing::default() });
+        if plan.shows_nothing() {
+            return Ok(Frame::new(Image::transparent(plan.size()), Timing::default()));
         }
         let begin = Instant::now();
-        let image = dispatch(plan, Rendering);
-        Ok(Frame { image, timing: Timing { wall_ms: milliseconds(begin), ..Timing::default() } })
+        let image = dispatch(plan, Rendering)?;
+        Ok(Frame::new(image, Timing::of_rendering(milliseconds(begin))))
     }
 
+    fn as_evaluate(&mut self) -> Option<&mut dyn Evaluate> {
+        Some(self)
+    }
+}
+
+impl Evaluate for CpuBackend {
     fn evaluate(
         &mut self,
         plan: &FramePlan,
@@ -88,7 +91,7 @@ impl Backend for CpuBackend {
         inputs: &[[f32; 4]],
     ) -> Result<Vec<[f32; 4]>, RenderError> {
         check(plan)?;
-        Ok(dispatch(plan, Evaluation { function, inputs }))
+        dispatch(plan, Evaluation { function, inputs })
     }
 }
 
@@ -98,19 +101,20 @@ trait Work {
     fn run<const N: usize, S: Stored>(self, scene: &Scene<N, S>) -> Self::Output;
 }
 
-fn dispatch<W: Work>(plan: &FramePlan, work: W) -> W::Output {
-    match plan.bricks.format() {
+fn dispatch<W: Work>(plan: &FramePlan, work: W) -> Result<W::Output, RenderError> {
+    match plan.field().slots().format() {
         SampleFormat::Unorm8 => dispatch_side::<Unorm8, W>(plan, work),
         SampleFormat::Unorm16 => dispatch_side::<Unorm16, W>(plan, work),
         SampleFormat::Float32 => dispatch_side::<Float32, W>(plan, work),
     }
 }
 
-fn dispatch_side<S: Stored, W: Work>(plan: &FramePlan, work: W) -> W::Output {
-    match plan.bricks.side() {
-        BrickSide::S16 => work.run(&Scene::<16, S>::new(plan)),
-        BrickSide::S32 => work.run(&Scene::<32, S>::new(plan)),
-        BrickSide::S64 => work.run(&Scene::<64, S>::new(plan)),
+fn dispatch_side<S: Stored, W: Work>(plan: &FramePlan, work: W) -> Result<W::Output, RenderError> {
+    match plan.field().slots().places() {
+        Places::Even(BrickSide::S16) => Ok(work.run(&Scene::<16, S>::new(plan))),
+        Places::Even(BrickSide::S32) => Ok(work.run(&Scene::<32, S>::new(plan))),
+        Places::Even(BrickSide::S64) => Ok(work.run(&Scene::<64, S>::new(plan))),
+        Places::Table { .. } => Err(RenderError::Unsupported { what: "draw slots of several sizes" }),
     }
 }
 
@@ -151,12 +155,12 @@ impl<const N: usize, S: Stored> pulp::NullaryFnOnce for Band<'_, N, S> {
         for tile in (0..self.width).step_by(TILE) {
             let columns = tile..(tile + TILE).min(self.width);
             let corner = UVec2::new(tile as u32, self.first_row as u32);
-            let runs = plan.beams.as_ref().map_or(std::slice::from_ref(&ALL), |beams| beams.runs(corner));
+            let runs = plan.beams().map_or(std::slice::from_ref(&ALL), |beams| beams.runs(corner));
             if runs.is_empty() {
                 continue;
             }
             for (y, x) in (0..n_rows).flat_map(|y| columns.clone().map(move |x| (y, x))) {
-                let ray = plan.rays.ray(x as u32, (self.first_row + y) as u32);
+                let ray = plan.rays().ray(x as u32, (self.first_row + y) as u32);
                 self.pixels[y * self.width + x] = march::march(self.scene, &ray, runs);
             }
         }
@@ -191,7 +195,7 @@ fn evaluate<const N: usize, S: Stored>(
             [o.color[0], o.color[1], o.color[2], o.extinction]
         }
         ShaderFunction::Segment => {
-            let rule = scene.plan.sampling.rule();
+            let rule = scene.plan.sampling().rule();
             let s = segment::segment(rule, transfer, [Some(relative(x)), Some(relative(y))], z);
             [s.emission[0], s.emission[1], s.emission[2], s.depth]
         }
@@ -200,32 +204,22 @@ fn evaluate<const N: usize, S: Stored>(
             value.map_or([0.0; 4], |v| [values.value(v.into()) as f32, 1.0, 0.0, 0.0])
         }
         ShaderFunction::RayAnchor => {
-            let ray = scene.plan.rays.ray(x as u32, y as u32);
+            let ray = scene.plan.rays().ray(x as u32, y as u32);
             let a = ray.anchor.as_vec3();
             [a.x, a.y, a.z, ray.t_anchor as f32]
         }
         ShaderFunction::RayDirection => {
-            let d = scene.plan.rays.ray(x as u32, y as u32).direction.as_vec3();
+            let d = scene.plan.rays().ray(x as u32, y as u32).direction.as_vec3();
             [d.x, d.y, d.z, 0.0]
         }
     }
 }
 
-/// Refuses pictures that are too large, plans without samples, and plans that name bricks they do not have.
+/// Refuses pictures that are too large.
 fn check(plan: &FramePlan) -> Result<(), RenderError> {
     let size: UVec2 = plan.size();
     if size.max_element() > MAX_IMAGE {
         return Err(RenderError::ImageTooLarge { size, limit: MAX_IMAGE });
-    }
-    if plan.index.dims().min_element() == 0 || plan.dims.min_element() == 0 {
-        return Err(RenderError::Unsupported { what: "draw a volume without samples" });
-    }
-    let stranger = |w: &u32| match IndexEntry::unpack(*w) {
-        IndexEntry::Resident { slot, .. } => slot >= plan.bricks.n_bricks(),
-        IndexEntry::Transparent { .. } => false,
-    };
-    if plan.index.words().iter().any(stranger) {
-        return Err(RenderError::Unsupported { what: "draw a brick that the plan does not bring" });
     }
     Ok(())
 }

@@ -34,20 +34,21 @@ pub(super) struct Block {
 
 impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
     pub(super) fn new(plan: &'a FramePlan) -> Self {
-        let (decode, values) = (plan.bricks.decode(), plan.value_scale());
+        let (slots, values) = (plan.field().slots(), plan.value_scale());
+        let decode = slots.decode();
         let gain = decode.scale / values.unit() / S::FORMAT.unit();
         let bias = match S::FORMAT {
-            SampleFormat::Unorm16 => plan.bricks.nearest_stored(values.origin()),
+            SampleFormat::Unorm16 => slots.nearest_stored(values.origin()),
             SampleFormat::Unorm8 | SampleFormat::Float32 => 0.0,
         };
         Scene {
             plan,
-            center: plan.rays.center,
-            last: plan.last_sample(),
+            center: plan.rays().center,
+            last: plan.field().last_sample(),
             gain: gain as f32,
             offset: (bias * gain + values.number(decode.offset)) as f32,
             bias: bias as f32,
-            transfer: Classifier::new(&plan.transfer, values),
+            transfer: Classifier::new(plan.transfer(), values),
             stored: std::marker::PhantomData,
         }
     }
@@ -57,7 +58,7 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
     pub(super) fn block(&self, q: DVec3) -> Block {
         const { assert!(N.is_power_of_two()) }
         let n_cells = (N - 1) as f64;
-        let dims = self.plan.index.dims();
+        let dims = self.plan.field().index().dims();
         // Truncation is floor: a clamped position is not negative. Half a sample away from every face, the quotient's
         // rounding does not matter.
         let sample = q.clamp(DVec3::ZERO, self.last).as_ivec3().as_dvec3();
@@ -67,11 +68,9 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
     /// The block of an index cell.
     #[inline(always)]
     pub(super) fn block_of(&self, cell: UVec3) -> Block {
-        let (n_cells, dims) = ((N - 1) as f64, self.plan.index.dims());
-        let entry = self.plan.index.at(cell);
-        let level = u32::from(entry.level().0);
-        let low = cell >> level << level;
-        let high = low + (1 << level);
+        let (n_cells, dims) = ((N - 1) as f64, self.plan.field().index().dims());
+        let entry = self.plan.field().index().at(cell);
+        let (low, high) = entry.reach().block(cell);
         let corner = low.as_dvec3() * n_cells;
         Block {
             entry,
@@ -81,15 +80,16 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
         }
     }
 
-    /// The value at a sample position, as a number of the value scale; `None` where its block is transparent.
+    /// The value at a sample position, as a number of the value scale; `None` where its block is empty.
     pub(super) fn value(&self, q: DVec3) -> Option<f32> {
         self.value_in(&self.block(q), q)
     }
 
     /// The value that a block has at a sample position.
     pub(super) fn value_in(&self, block: &Block, q: DVec3) -> Option<f32> {
-        let IndexEntry::Resident { slot, level } = block.entry else { return None };
-        let s = (q.clamp(DVec3::ZERO, self.last) - block.corner) / f64::from(level.stride());
+        let IndexEntry::Resident { slot, reach } = block.entry else { return None };
+        let stride = f64::from(reach.level_of_brick().stride());
+        let s = (q.clamp(DVec3::ZERO, self.last) - block.corner) / stride;
         let nodes =
             Nodes { origin: s.as_vec3().to_array(), change: [0.0; 3], last: [(N - 1) as f32; 3], bias: self.bias };
         Some(self.values(&nodes, self.brick(slot), &[0.0])[0])
@@ -119,7 +119,8 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
     /// The bytes of the brick in a slot.
     #[inline(always)]
     pub(super) fn brick(&self, slot: u32) -> &'a [u8] {
-        let n_bytes = N * N * N * S::N_BYTES;
-        &self.plan.bricks.bytes()[slot as usize * n_bytes..][..n_bytes]
+        let samples =
+            self.plan.field().slots().samples(slot).expect("the slots that a plan's index names hold samples");
+        &samples.bytes()[..N * N * N * S::N_BYTES]
     }
 }

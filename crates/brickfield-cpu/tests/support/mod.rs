@@ -8,8 +8,9 @@ use brickfield_core::{
     Aabb, BrickId, BrickLayout, BrickSide, Camera, Grid, Knot, Level, Projection, ScalarType, TransferFunction, Volume,
 };
 use brickfield_frame::{
-    Beams, BrickSet, Decode, Division, FeatureSet, FramePlan, IndexEntry, IndexGrid, Lengths, MacrocellRanges, Mode,
-    Overview, Placement, RayFrame, SampleFormat, Sampling, Steps,
+    Chunk, DarkRegions, Decode, Division, Drawing, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join,
+    Lengths, MacrocellRanges, Mode, Occupancy, Placement, Places, PlanParts, RayFrame, Reach, SampleFormat, Sampling,
+    Slots, Steps,
 };
 use brickfield_optics::QuadratureRule;
 
@@ -80,58 +81,61 @@ impl<'a> Setup<'a> {
     }
 
     pub fn plan(&self) -> FramePlan {
-        let grid = self.volume.grid();
-        let domain = whole(self.volume).intersection(&self.clip);
-        let (index, bricks, visible) = cut(self);
+        FramePlan::new(self.parts()).unwrap()
+    }
+
+    pub fn parts(&self) -> PlanParts {
         let sampling = Sampling::new(self.step_world, self.rule, self.mode).unwrap();
         let sampling = sampling.divided(self.division).weighted(self.lengths).unwrap();
         let steps = Steps::of(&sampling, self.placement, Level(3)).unwrap();
-        let mut plan = FramePlan {
-            dims: grid.dims(),
-            rays: RayFrame::new(&self.camera, grid, self.size, &whole(self.volume), &steps),
-            domain,
-            visible: visible.intersection(&domain),
+        let volume_box = whole(self.volume);
+        let field = cut(self);
+        let dark = match self.skip {
+            Skip::Nothing => DarkRegions::default(),
+            Skip::Transparent => DarkRegions::new(&field, occupancy(&field, &self.transfer)).unwrap(),
+        };
+        PlanParts {
+            field,
+            rays: RayFrame::new(&self.camera, self.volume.grid(), self.size, &volume_box, &steps),
+            domain: volume_box.intersection(&self.clip),
             sampling,
             transfer: self.transfer.clone(),
-            index,
-            occupancy: (self.skip == Skip::Transparent)
-                .then(|| MacrocellRanges::of(&bricks).occupancy(&self.transfer))
-                .flatten(),
-            bricks: Arc::new(bricks),
-            beams: None,
-            proxy: None,
-            features: FeatureSet::all(),
-        };
-        if self.skip == Skip::Transparent {
-            let overview = Overview::of(self.side, &plan.index, plan.occupancy.as_deref());
-            plan.beams = overview.and_then(|overview| Beams::of(&plan, &overview)).map(Arc::new);
+            dark,
+            drawing: Drawing::Rays,
         }
-        plan
     }
 }
 
-fn cut(setup: &Setup) -> (IndexGrid, BrickSet, Aabb) {
+/// The bricks of a setup; without the transparent ones, if they are skipped.
+fn cut(setup: &Setup) -> Field {
     let layout = BrickLayout::new(setup.volume.grid().dims(), setup.side);
-    let (format, decode) = BrickSet::encoding(setup.volume.scalar_type(), setup.volume.range());
-    let mut index = IndexGrid::transparent(layout.n_bricks(Level(0)));
-    let (mut bytes, mut n_slots) = (Vec::new(), 0);
-    let mut visible = Aabb::of_points([]);
+    let (format, decode) = SampleFormat::encoding(setup.volume.scalar_type(), setup.volume.range());
+    let (mut entries, mut bricks) = (Vec::new(), Vec::new());
     for id in chosen(&layout, setup.level) {
+        let (cell, reach) = (id.coords << u32::from(id.level.0), Reach::of_brick(id.level));
         let (stored, transparent) = brick(setup, &layout, id, format, decode);
-        let cell = id.coords << u32::from(id.level.0);
         if transparent && setup.skip == Skip::Transparent {
-            index.fill(cell, IndexEntry::Transparent { level: id.level });
+            entries.push((cell, IndexEntry::Empty { reach }));
             continue;
         }
-        index.fill(cell, IndexEntry::Resident { slot: n_slots, level: id.level });
-        n_slots += 1;
-        bytes.extend(stored);
-        let b = layout.index_box(id);
-        visible = visible.union(&Aabb { min: b.min - 0.5, max: b.max - 0.5 });
+        entries.push((cell, IndexEntry::Resident { slot: bricks.len() as u32, reach }));
+        bricks.push(Some(Arc::new(Chunk::new(stored))));
     }
-    // Faces are assigned by sample position: a brick's box reaches from corner to corner.
-    let visible = Aabb { min: visible.min - 0.5, max: visible.max + 0.5 };
-    (index, BrickSet::new(setup.side, format, decode, bytes).unwrap(), visible)
+    let lattice = IndexLattice { cell_samples: setup.side.n_cells(), origin: 0.0 };
+    let index = IndexGrid::new(layout.n_bricks(Level(0)), lattice, entries);
+    let slots = Slots::new(format, decode, Places::Even(setup.side), bricks).unwrap();
+    Field::new(layout.dims(), Arc::new(index), Arc::new(slots), Join::Shared).unwrap()
+}
+
+/// Which macrocells of a field's bricks are dark.
+fn occupancy(field: &Field, transfer: &TransferFunction) -> Option<Arc<Occupancy>> {
+    let slots = field.slots();
+    let side = slots.brick_side()?;
+    let distances = |chunk: &Arc<Chunk>| {
+        let ranges = MacrocellRanges::of(side, slots.format(), chunk.bytes());
+        Arc::new(ranges.distances(slots.decode(), transfer))
+    };
+    Occupancy::new(side, slots.all_samples().iter().map(|chunk| chunk.as_ref().map(distances)).collect())
 }
 
 /// The bricks of a cut: for each index cell the coarsest brick that all its cells allow.

@@ -10,7 +10,7 @@ use brickfield_core::glam::UVec3;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-use crate::{Division, FramePlan, IndexEntry, Lengths, Placement};
+use crate::{ContentId, FramePlan, Lengths};
 use picture::Projector;
 use polygon::area;
 use surfaces::{Outline, outlines};
@@ -25,7 +25,7 @@ use surfaces::{Outline, outlines};
 /// Polygons are projected, and grown by an eighth of a pixel and by what f32 may put a ray beside its pixel
 /// ([`RayFrame::rounding`](crate::RayFrame::rounding)): which fragments count is decided by the shader from the ray; rasterisers round corners to 1/256 of a
 /// pixel.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct ProxyGeometry {
     target: Target,
     bricks: Vec<[u32; 4]>,
@@ -33,6 +33,7 @@ pub struct ProxyGeometry {
     indices: Vec<u32>,
     batches: Vec<Range<u32>>,
     n_polygons: usize,
+    id: ContentId,
 }
 
 /// What polygons are blended into.
@@ -102,16 +103,12 @@ const BATCH_FRAGMENTS: f64 = (1u32 << 24) as f64;
 impl ProxyGeometry {
     /// The polygons of a plan whose resident bricks hold the index cells `back_to_front`, one cell for each brick.
     ///
-    /// Spheres have no polygons, nor have segments that do not end with their brick ([`Division::Ray`]): then there are none.
-    ///
     /// Cost: 1 to 2 us a polygon on two cores; all threads of the current rayon pool are used.
-    pub fn of(plan: &FramePlan, back_to_front: &[UVec3], target: Target) -> ProxyGeometry {
-        let is_drawn = plan.rays.placement != Placement::Shells && plan.sampling.division() == Division::Brick;
-        let back_to_front = if is_drawn { back_to_front } else { &[] };
+    pub(crate) fn of(plan: &FramePlan, back_to_front: &[UVec3], target: Target) -> ProxyGeometry {
         let projector = Projector::new(plan);
         let of_brick = |cell: &UVec3| outlines(plan, &projector, *cell);
         let outlines: Vec<Vec<Outline>> = back_to_front.par_iter().map(of_brick).collect();
-        let word = |cell: UVec3| [cell.x, cell.y, cell.z, plan.index.at(cell).pack()];
+        let word = |cell: UVec3| [cell.x, cell.y, cell.z, plan.field.index().at(cell).pack()];
         let mut geometry = ProxyGeometry {
             target,
             bricks: back_to_front.iter().map(|cell| word(*cell)).collect(),
@@ -119,6 +116,7 @@ impl ProxyGeometry {
             indices: Vec::new(),
             batches: Vec::new(),
             n_polygons: 0,
+            id: ContentId::new(),
         };
         geometry.fill(&outlines, BATCH_FRAGMENTS);
         geometry
@@ -162,6 +160,11 @@ impl ProxyGeometry {
         area(points)
     }
 
+    /// The identity of corners, triangles and bricks.
+    pub fn id(&self) -> ContentId {
+        self.id
+    }
+
     /// What the polygons are blended into.
     pub fn target(&self) -> Target {
         self.target
@@ -182,8 +185,9 @@ impl ProxyGeometry {
         &self.indices
     }
 
-    /// The triangles, to change some (a mutant in conformance runs does).
+    /// The triangles, to change some (a mutant in conformance runs does): from now on they are other polygons.
     pub fn indices_mut(&mut self) -> &mut [u32] {
+        self.id = ContentId::new();
         &mut self.indices
     }
 
@@ -219,6 +223,7 @@ mod tests {
             indices: Vec::new(),
             batches: Vec::new(),
             n_polygons: 0,
+            id: ContentId::new(),
         };
         geometry.fill(&outlines, 100.0);
         geometry

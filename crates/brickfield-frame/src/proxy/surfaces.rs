@@ -5,7 +5,7 @@ use brickfield_core::glam::{DVec2, DVec3, UVec3};
 
 use super::picture::{GROWN, Projector};
 use super::polygon::{Plane, clip, face, slice};
-use super::{IndexEntry, Lengths, ProxyCorner};
+use super::{Lengths, ProxyCorner};
 use crate::{FramePlan, Placement};
 
 /// A polygon in the picture.
@@ -40,11 +40,11 @@ const PYRAMID_MARGIN: f64 = 1.002;
 
 /// The polygons of the brick that holds an index cell, from back to front along every ray.
 pub(super) fn outlines(plan: &FramePlan, projector: &Projector<'_>, cell: UVec3) -> Vec<Outline> {
-    let (b, entry) = (plan.block_box(cell), plan.index.at(cell));
-    if b.is_empty() || !matches!(entry, IndexEntry::Resident { .. }) {
+    let b = plan.block_box(cell);
+    if b.is_empty() || plan.field.index().at(cell).slot().is_none() {
         return Vec::new();
     }
-    let step = plan.sampling.step_world() * f64::from(entry.level().stride());
+    let step = plan.sampling.step_world() * f64::from(plan.field.level_at(cell).stride());
     let mut outlines = match plan.sampling.lengths() {
         Lengths::True => exits(plan, projector, &b),
         Lengths::Nominal => Vec::new(),

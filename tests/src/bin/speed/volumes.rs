@@ -120,9 +120,10 @@ impl TimedVolume {
     }
 
     fn say_resident(&self, side: BrickSide, tree: &BrickTree, scene: &Scene) -> anyhow::Result<()> {
-        let bricks = prepare(tree, scene, &mut Residency::default())?.bricks;
-        let megabytes = bricks.bytes().len() as f64 / 1e6;
-        println!("{}, bricks of {side}: {} resident, {megabytes:.1} MB", self.name, bricks.n_bricks());
+        let plan = prepare(tree, scene, &mut Residency::default())?;
+        let slots = plan.field().slots();
+        let megabytes = slots.n_bytes() as f64 / 1e6;
+        println!("{}, bricks of {side}: {} resident, {megabytes:.1} MB", self.name, slots.n_filled());
         Ok(())
     }
 }

@@ -135,7 +135,7 @@ fn steepness(transfer: &TransferFunction) -> (f64, f64) {
 }
 
 fn classify_points(plan: &FramePlan) -> Vec<Point> {
-    let transfer = &plan.transfer;
+    let transfer = plan.transfer();
     let (most, slope) = steepness(transfer);
     let point = |v: f32| {
         let o = transfer.at(f64::from(v));
@@ -180,7 +180,7 @@ fn classifications() -> Vec<Case> {
 
 /// Segments of all lengths between values near and far; both ways for the rules of two nodes.
 fn segment_points(plan: &FramePlan) -> Vec<Point> {
-    let (rule, transfer) = (plan.sampling.rule(), &plan.transfer);
+    let (rule, transfer) = (plan.sampling().rule(), plan.transfer());
     let ends = [-4.0f32, -2.3, -1.5, -0.2, 0.6, 0.7, 1.4, 2.5, 5.0, 9.0];
     let lengths = [1e-12f32, 1e-6, 1e-3, 0.1, 1.0, 30.0, 1e6, 1e12];
     let point = |a: f32, b: f32, length: f32| {
@@ -216,7 +216,7 @@ fn segments() -> Vec<Case> {
 
 /// Positions inside, outside, on samples and on brick faces (inner ones a hair to either side).
 fn sample_points(plan: &FramePlan) -> Vec<Point> {
-    let last = plan.last_sample();
+    let last = plan.field().last_sample();
     let range = 65535.0;
     let grid = (0..1000u32).map(|i| {
         let f = |k: u32| f64::from(i.wrapping_mul(k) % 1009) / 1008.0;
@@ -239,7 +239,7 @@ fn sample_points(plan: &FramePlan) -> Vec<Point> {
 
 /// On a face between levels either side is right.
 fn far_from_faces(plan: &FramePlan, q: DVec3) -> bool {
-    let n_cells = f64::from(plan.bricks.side().n_cells());
+    let n_cells = f64::from(plan.field().index().lattice().cell_samples);
     let off = |x: f64| ((x / n_cells).round() * n_cells - x).abs();
     off(q.x).min(off(q.y)).min(off(q.z)) > 1e-3
 }
@@ -280,10 +280,10 @@ fn samples() -> Vec<Case> {
 
 fn ray_points(plan: &FramePlan, function: ShaderFunction) -> Vec<Point> {
     let size = plan.size();
-    let scale = plan.domain.extent().length() + plan.rays.anchor.iter().map(|a| a.length()).fold(0.0, f64::max);
+    let scale = plan.domain().extent().length() + plan.rays().anchor.iter().map(|a| a.length()).fold(0.0, f64::max);
     let point = |i: u32| {
         let (x, y) = (i % size.x, i / size.x);
-        let ray = plan.rays.ray(x, y);
+        let ray = plan.rays().ray(x, y);
         let (v, w, t) = match function {
             ShaderFunction::RayAnchor => (ray.anchor, ray.t_anchor, 4e-6 * (scale + ray.t_anchor.abs())),
             _ => (ray.direction, 0.0, 4e-6 * ray.direction.length()),

@@ -21,7 +21,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let scene = args.sampling.of(args.view.scene(&subject)?)?;
     let mut residency = Residency::default();
     let plan = prepare(&subject.tree, &scene, &mut residency).map_err(Failure::usage)?;
-    if plan.visible.is_empty() {
+    if plan.visible().is_empty() {
         eprintln!(
             "note: nothing is visible: the transfer function is 0 over all values inside the clip box and the view"
         );
@@ -120,7 +120,7 @@ fn attributes(
 
 /// Where samples lie and what is made of them, in the words of the options.
 fn sampling(backend: &dyn Backend, scene: &Scene, plan: &FramePlan) -> String {
-    let technique = match (scene.technique, &plan.proxy) {
+    let technique = match (scene.technique, plan.proxy()) {
         (Technique::Polygons(target), _) if backend.describe().backend == BackendKind::Cpu.name() => {
             format!("rays cast to the samples of polygons {}", target.name())
         }
@@ -135,14 +135,14 @@ fn summary(backend: &dyn Backend, scene: &Scene, plan: &FramePlan, frame: &Frame
     let d = backend.describe();
     let t = frame.timing;
     let device = t.device_ms.map(|ms| format!(", device {ms:.1} ms")).unwrap_or_default();
-    let mib = plan.bricks.bytes().len() as f64 / f64::from(1 << 20);
+    let mib = plan.field().slots().n_bytes() as f64 / f64::from(1 << 20);
     format!(
         "{}: {} ({})\n{}\n{} bricks, {mib:.1} MiB\nupload {:.1} ms, render {:.1} ms{device}, read back {:.1} ms\n",
         d.backend,
         d.adapter,
         d.driver,
         sampling(backend, scene, plan),
-        plan.bricks.n_bricks(),
+        plan.field().slots().n_filled(),
         t.upload_ms,
         t.wall_ms,
         t.read_back_ms

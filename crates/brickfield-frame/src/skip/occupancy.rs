@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use brickfield_core::BrickSide;
-use rayon::prelude::*;
 
-use crate::chebyshev;
+use super::chebyshev;
+use crate::{Chunk, Chunked, ContentId};
 
 /// Cells along a macrocell's side, whatever the brick's level: 8^3 macrocells in a brick of 16^3 samples, 32^3 in one of 64^3.
 pub const MACROCELL_SIDE: u32 = 2;
@@ -16,12 +16,18 @@ pub const MACROCELL_SIDE: u32 = 2;
 /// d > 0: all macrocells of the brick less than d away are dark, that is, the transfer function is 0 over the range of their
 /// samples, so that passing over them changes no sample. d < 0: all less than -d away are visible, so that nobody need look
 /// again there. No distance is 0; in a brick of one kind all are as far as the brick is wide.
-///
-/// Maps are compared by identity ([`Held`](crate::Held)) to tell whether a backend holds them already.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Occupancy {
     side: BrickSide,
-    distances: Vec<i8>,
+    bricks: Vec<Option<Arc<Chunk>>>,
+    id: ContentId,
+}
+
+/// Occupancies are equal if their distances are.
+impl PartialEq for Occupancy {
+    fn eq(&self, other: &Occupancy) -> bool {
+        self.id == other.id || (self.side, &self.bricks) == (other.side, &other.bricks)
+    }
 }
 
 impl Occupancy {
@@ -30,46 +36,85 @@ impl Occupancy {
         side.n_samples() / MACROCELL_SIDE
     }
 
+    /// Macrocells in a brick.
+    pub const fn n_macrocells_total(side: BrickSide) -> usize {
+        (Occupancy::n_macrocells(side) as usize).pow(3)
+    }
+
     /// Whether a map of so many bricks fits the storage buffers that every Vulkan device has: 128 MiB.
     ///
     /// Of more bricks no map is made: their rays pass over dark bricks only.
     pub const fn fits(side: BrickSide, n_bricks: u32) -> bool {
-        (Occupancy::n_macrocells(side) as u64).pow(3) * n_bricks as u64 <= 1 << 27
+        Occupancy::n_macrocells_total(side) as u64 * n_bricks as u64 <= 1 << 27
     }
 
-    /// The map of bricks of which it is known what is visible: macrocell after macrocell, x fastest, brick after brick.
+    /// The distances in one brick, of which it is known what is visible: macrocell after macrocell, x fastest.
+    ///
+    /// # Panics
+    /// If there are not as many macrocells as in a brick.
+    pub fn of_brick(side: BrickSide, visible: &[bool]) -> Chunk {
+        assert_eq!(visible.len(), Occupancy::n_macrocells_total(side), "macrocells of a brick of {side}");
+        let mut distances = vec![0; visible.len()];
+        spread(visible, Occupancy::n_macrocells(side) as usize, &mut distances);
+        Chunk::new(bytemuck::cast_slice::<i8, u8>(&distances))
+    }
+
+    /// The map of bricks by their slots, each [`of_brick`](Self::of_brick).
     ///
     /// `None` if everything is visible: then there is nothing to leap over.
     ///
     /// # Panics
-    /// If the macrocells are not those of whole bricks.
-    pub fn new(side: BrickSide, visible: &[bool]) -> Option<Arc<Occupancy>> {
-        let n = Occupancy::n_macrocells(side) as usize;
-        assert!(visible.len().is_multiple_of(n.pow(3)), "{} macrocells are not whole bricks", visible.len());
-        if visible.iter().all(|v| *v) {
-            return None;
-        }
-        let mut distances = vec![0; visible.len()];
-        let bricks = distances.par_chunks_exact_mut(n.pow(3)).zip(visible.par_chunks_exact(n.pow(3)));
-        bricks.for_each(|(out, visible)| of_brick(visible, n, out));
-        Some(Arc::new(Occupancy { side, distances }))
+    /// If a brick has not as many distances as a brick has macrocells.
+    pub fn new(side: BrickSide, bricks: Vec<Option<Arc<Chunk>>>) -> Option<Arc<Occupancy>> {
+        let n = Occupancy::n_macrocells_total(side);
+        assert!(bricks.iter().flatten().all(|b| b.bytes().len() == n), "distances of bricks of {side}");
+        // In a brick of one kind all distances are equal.
+        let is_dark = |brick: &Arc<Chunk>| brick.bytes().iter().any(|d| *d as i8 > 0);
+        let any_dark = bricks.iter().flatten().any(is_dark);
+        any_dark.then(|| Arc::new(Occupancy { side, bricks, id: ContentId::new() }))
+    }
+
+    /// Samples along the side of its bricks.
+    pub fn side(&self) -> BrickSide {
+        self.side
+    }
+
+    /// Whether the brick in a slot has distances.
+    pub fn has(&self, slot: u32) -> bool {
+        self.bricks.get(slot as usize).is_some_and(Option::is_some)
     }
 
     /// The distances of one brick's macrocells, x fastest.
+    ///
+    /// # Panics
+    /// If the slot has none.
     #[inline]
     pub fn brick(&self, slot: u32) -> &[i8] {
-        let n = (Occupancy::n_macrocells(self.side) as usize).pow(3);
-        &self.distances[slot as usize * n..][..n]
+        let brick = self.bricks[slot as usize].as_ref().expect("a plan's bricks have distances");
+        bytemuck::cast_slice(brick.bytes())
+    }
+}
+
+impl Chunked for Occupancy {
+    fn id(&self) -> ContentId {
+        self.id
     }
 
-    /// All distances, brick after brick; a multiple of 512.
-    pub fn distances(&self) -> &[i8] {
-        &self.distances
+    fn chunk_bytes(&self) -> usize {
+        Occupancy::n_macrocells_total(self.side)
+    }
+
+    fn n_chunks(&self) -> usize {
+        self.bricks.len()
+    }
+
+    fn chunk(&self, i: usize) -> Option<(ContentId, &[u8])> {
+        self.bricks[i].as_ref().map(|chunk| (chunk.id(), chunk.bytes()))
     }
 }
 
 /// The distances of the macrocells of one brick, `n` along a side.
-fn of_brick(visible: &[bool], n: usize, out: &mut [i8]) {
+fn spread(visible: &[bool], n: usize, out: &mut [i8]) {
     let far = n as u8;
     let to = |kind: bool| {
         let mut distances: Vec<u8> = visible.iter().map(|v| if *v == kind { 0 } else { far }).collect();
@@ -88,6 +133,11 @@ mod tests {
     use super::*;
     use brickfield_core::glam::UVec3;
 
+    fn of_bricks(side: BrickSide, visible: &[bool]) -> Option<Arc<Occupancy>> {
+        let bricks = visible.chunks(Occupancy::n_macrocells_total(side));
+        Occupancy::new(side, bricks.map(|v| Some(Arc::new(Occupancy::of_brick(side, v)))).collect())
+    }
+
     #[test]
     fn distances_are_those_of_a_search() {
         [BrickSide::S16, BrickSide::S32].into_iter().for_each(check_distances);
@@ -99,7 +149,7 @@ mod tests {
         // Few visible ones in the first brick, few dark ones in the second.
         let rare = |c: &UVec3| (c.x * 31 + c.y * 17 + c.z * 7).is_multiple_of(97);
         let visible: Vec<bool> = [true, false].iter().flat_map(|v| cells.iter().map(move |c| rare(c) == *v)).collect();
-        let map = Occupancy::new(side, &visible).unwrap();
+        let map = of_bricks(side, &visible).unwrap();
         for (slot, visible) in visible.chunks(cells.len()).enumerate() {
             for ((a, is_visible), d) in cells.iter().zip(visible).zip(map.brick(slot as u32)) {
                 let far = |b: &UVec3| (a.as_ivec3() - b.as_ivec3()).abs().max_element() as i8;
@@ -120,8 +170,8 @@ mod tests {
 
     #[test]
     fn where_nothing_is_visible_the_whole_brick_is_passed_over() {
-        let map = Occupancy::new(BrickSide::S16, &[false; 512]).unwrap();
-        assert!(map.distances().iter().all(|d| *d == 8));
-        assert_eq!(Occupancy::new(BrickSide::S16, &[true; 1024]), None);
+        let map = of_bricks(BrickSide::S16, &[false; 512]).unwrap();
+        assert!(map.brick(0).iter().all(|d| *d == 8));
+        assert_eq!(of_bricks(BrickSide::S16, &[true; 1024]), None);
     }
 }

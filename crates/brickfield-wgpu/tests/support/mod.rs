@@ -1,7 +1,5 @@
 //! Plans made by hand: a field, its bricks, and a view of them.
-
-// A module of test programs: nothing outside can reach it.
-#![allow(unreachable_pub)]
+#![allow(dead_code, unreachable_pub)]
 
 use std::sync::Arc;
 
@@ -10,17 +8,18 @@ use brickfield_core::{
     Aabb, BrickLayout, BrickSide, Camera, Grid, Knot, Level, Projection, TransferFunction, ValueRange,
 };
 use brickfield_frame::{
-    BrickSet, Decode, Feature, FeatureSet, FramePlan, IndexEntry, IndexGrid, Mode, QuadratureRule, RayFrame,
-    SampleFormat, Sampling, Steps,
+    Chunk, DarkRegions, Decode, Drawing, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, Mode, Places,
+    PlanParts, QuadratureRule, RayFrame, Reach, SampleFormat, Sampling, Slots, Steps,
 };
+use brickfield_wgpu::{AdapterChoice, OpenError, WgpuBackend};
 
 const SIDE: BrickSide = BrickSide::S16;
 
-/// A field over sample positions, and how it is looked at.
+/// What a plan is made from: values over sample positions, and how they are looked at.
 #[derive(Clone)]
-pub struct Scene {
+pub struct Setup {
     pub dims: UVec3,
-    pub field: fn(DVec3) -> f64,
+    pub value: fn(DVec3) -> f64,
     pub format: SampleFormat,
     pub transfer: TransferFunction,
     pub camera: Camera,
@@ -32,6 +31,18 @@ pub struct Scene {
     pub level: fn(UVec3) -> Level,
     /// Whether transparent bricks are left out.
     pub skip: bool,
+}
+
+/// A backend, if this machine has one.
+pub fn backend() -> Option<WgpuBackend> {
+    match WgpuBackend::new(&AdapterChoice::Default) {
+        Ok(backend) => Some(backend),
+        Err(OpenError::NoAdapter) => {
+            println!("no device");
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
 }
 
 pub fn knot(value: f64, extinction: f64, color: [f64; 3]) -> Knot {
@@ -54,11 +65,11 @@ pub fn oblique(dims: UVec3) -> Camera {
     Camera::framing(&b, DVec3::new(1.0, -2.0, 0.7), DVec3::Z).unwrap()
 }
 
-impl Scene {
-    pub fn new(dims: UVec3, field: fn(DVec3) -> f64, transfer: TransferFunction) -> Scene {
-        Scene {
+impl Setup {
+    pub fn new(dims: UVec3, value: fn(DVec3) -> f64, transfer: TransferFunction) -> Setup {
+        Setup {
             dims,
-            field,
+            value,
             format: SampleFormat::Float32,
             transfer,
             camera: oblique(dims),
@@ -72,51 +83,53 @@ impl Scene {
     }
 
     pub fn plan(&self) -> FramePlan {
-        let layout = BrickLayout::new(self.dims, SIDE);
+        FramePlan::new(self.parts()).unwrap()
+    }
+
+    pub fn parts(&self) -> PlanParts {
         let grid = Grid::axis_aligned(self.dims, DVec3::ONE).unwrap();
-        let domain = Aabb { min: DVec3::splat(-0.5), max: self.dims.as_dvec3() - 0.5 };
-        let mut index = IndexGrid::transparent(layout.n_bricks(Level(0)));
-        let (mut bytes, mut slot) = (Vec::new(), 0);
-        let mut visible: Option<Aabb> = None;
+        let field = self.field();
+        let domain = field.volume_box();
+        PlanParts {
+            field,
+            rays: RayFrame::new(&self.camera, &grid, self.size, &domain, &Steps::shells(self.step)),
+            domain,
+            sampling: Sampling::new(self.step, self.rule, self.mode).unwrap(),
+            transfer: self.transfer.clone(),
+            dark: DarkRegions::default(),
+            drawing: Drawing::Rays,
+        }
+    }
+
+    fn field(&self) -> Field {
+        let layout = BrickLayout::new(self.dims, SIDE);
+        let (mut entries, mut bricks) = (Vec::new(), Vec::new());
         for id in layout.bricks(Level(0)) {
             let level = (self.level)(id.coords);
-            let block = id.ancestor(level);
-            if block.coords << u32::from(level.0) != id.coords {
+            let (block, reach) = (id.ancestor(level), Reach::of_brick(level));
+            if reach.block(id.coords).0 != id.coords {
                 continue;
             }
             let samples = self.samples(block.coords.as_dvec3() * f64::from(15 * level.stride()), level);
             if self.skip && self.transfer.is_transparent(range(&samples)) {
-                index.fill(id.coords, IndexEntry::Transparent { level });
+                entries.push((id.coords, IndexEntry::Empty { reach }));
                 continue;
             }
-            index.fill(id.coords, IndexEntry::Resident { slot, level });
-            slot += 1;
-            bytes.extend(samples.iter().flat_map(|v| self.stored(*v)));
-            let b = layout.index_box(block);
-            let b = Aabb { min: b.min - 0.5, max: b.max - 0.5 };
-            visible = Some(visible.map_or(b, |v| v.union(&b)));
+            entries.push((id.coords, IndexEntry::Resident { slot: bricks.len() as u32, reach }));
+            let bytes: Vec<u8> = samples.iter().flat_map(|v| self.stored(*v)).collect();
+            bricks.push(Some(Arc::new(Chunk::new(bytes))));
         }
+        let lattice = IndexLattice { cell_samples: SIDE.n_cells(), origin: 0.0 };
+        let index = IndexGrid::new(layout.n_bricks(Level(0)), lattice, entries);
         let decode = Decode { scale: 1.0, offset: 0.0 };
-        FramePlan {
-            dims: self.dims,
-            rays: RayFrame::new(&self.camera, &grid, self.size, &domain, &Steps::shells(self.step)),
-            domain,
-            visible: visible.unwrap_or(Aabb { min: domain.min, max: domain.min }),
-            sampling: Sampling::new(self.step, self.rule, self.mode).unwrap(),
-            transfer: self.transfer.clone(),
-            occupancy: None,
-            beams: None,
-            proxy: None,
-            features: self.features(&index),
-            index,
-            bricks: Arc::new(BrickSet::new(SIDE, self.format, decode, bytes).unwrap()),
-        }
+        let slots = Slots::new(self.format, decode, Places::Even(SIDE), bricks).unwrap();
+        Field::new(self.dims, Arc::new(index), Arc::new(slots), Join::Shared).unwrap()
     }
 
     fn samples(&self, corner: DVec3, level: Level) -> Vec<f64> {
         let last = (self.dims - 1).as_dvec3();
         let at = |i: u32| DVec3::new(f64::from(i % 16), f64::from(i / 16 % 16), f64::from(i / 256));
-        (0..4096).map(|i| (self.field)((corner + at(i) * f64::from(level.stride())).min(last))).collect()
+        (0..4096).map(|i| (self.value)((corner + at(i) * f64::from(level.stride())).min(last))).collect()
     }
 
     fn stored(&self, value: f64) -> Vec<u8> {
@@ -125,21 +138,6 @@ impl Scene {
             SampleFormat::Unorm16 => ((value * 65535.0).round() as u16).to_le_bytes().to_vec(),
             SampleFormat::Float32 => (value as f32).to_le_bytes().to_vec(),
         }
-    }
-
-    fn features(&self, index: &IndexGrid) -> FeatureSet {
-        let entries = || index.words().iter().map(|w| IndexEntry::unpack(*w));
-        let fast = matches!(self.mode, Mode::Fast { .. });
-        [
-            (Feature::HardwareFilter, fast),
-            (Feature::EarlyTermination, fast),
-            (Feature::SkipTransparent, entries().any(|e| matches!(e, IndexEntry::Transparent { .. }))),
-            (Feature::MultiLevel, entries().any(|e| e.level() != Level(0))),
-            (Feature::TransferLookup, self.transfer.knots().len() > 1),
-        ]
-        .into_iter()
-        .filter_map(|(feature, needed)| needed.then_some(feature))
-        .collect()
     }
 }
 

@@ -5,11 +5,10 @@ mod overview;
 
 use std::ops::Range;
 
-use brickfield_core::Level;
 use brickfield_core::glam::UVec2;
 use rayon::prelude::*;
 
-use crate::{Division, FramePlan, IndexEntry, IndexGrid, Placement, QuadratureRule};
+use crate::{Division, FramePlan, Placement, QuadratureRule};
 use beam::Beam;
 pub use overview::Overview;
 
@@ -35,13 +34,13 @@ impl Beams {
     /// The beams of a plan's picture; `None` where they could pass over something.
     ///
     /// About 1 us a tile, over all threads of the current rayon pool.
-    pub fn of(plan: &FramePlan, overview: &Overview) -> Option<Beams> {
+    pub(crate) fn of(plan: &FramePlan, overview: &Overview) -> Option<Beams> {
         // Beams count segments of shells; bricks have segments of their own.
-        if plan.rays.placement != Placement::Shells || plan.sampling.division() == Division::Brick {
+        if plan.rays().placement != Placement::Shells || plan.sampling().division() == Division::Brick {
             return None;
         }
         // Between levels, what is dark need not be connected: a pre-integrated segment could cross something visible.
-        if plan.sampling.rule() == QuadratureRule::PreIntegrated && has_levels(&plan.index) {
+        if plan.sampling().rule() == QuadratureRule::PreIntegrated && plan.field().has_several_levels() {
             return None;
         }
         let size = plan.size();
@@ -54,7 +53,7 @@ impl Beams {
         let beam = |tile: u32| {
             let low = UVec2::new(tile % n.x, tile / n.x) * side;
             let high = (low + side).min(size);
-            Beam::new(&plan.rays, plan.dims, &(low.x..high.x), &(low.y..high.y)).runs(overview, plan)
+            Beam::new(plan.rays(), plan.field().dims(), &(low.x..high.x), &(low.y..high.y)).runs(overview, plan)
         };
         let runs = (0..n.element_product()).into_par_iter().map(beam).collect();
         Some(Beams { side, n_columns: n.x, runs })
@@ -82,14 +81,4 @@ impl Beams {
         };
         self.runs.iter().map(span).collect()
     }
-}
-
-/// Whether bricks of several levels are resident.
-fn has_levels(index: &IndexGrid) -> bool {
-    let resident = |w: &u32| match IndexEntry::unpack(*w) {
-        IndexEntry::Resident { level, .. } => Some(level),
-        IndexEntry::Transparent { .. } => None,
-    };
-    let mut levels = index.words().iter().filter_map(resident);
-    levels.next().is_some_and(|first: Level| levels.any(|level| level != first))
 }

@@ -96,14 +96,14 @@ impl Beam {
     /// The segments in which a ray of the tile may see something, front to back.
     pub(super) fn runs(&self, overview: &Overview, plan: &FramePlan) -> Vec<Range<i64>> {
         let mut runs: Vec<Range<i64>> = Vec::new();
-        let step = plan.sampling.step_world();
+        let step = plan.sampling().step_world();
         let segment = |u: f32| (f64::from(u) + self.t_center) / step;
         let visible = Region { low: plan.visible.min.as_vec3a(), high: plan.visible.max.as_vec3a() };
         let (start, end) = self.span(visible);
         // A beam that widens faster than it moves never leaves a box.
-        let end = end.min((plan.rays.n_segments * step - self.t_center) as f32);
+        let end = end.min((plan.rays().n_segments * step - self.t_center) as f32);
         let pace = overview.pace(self.low[0].change.abs().max_element()).max(step as f32);
-        let mut u = start.max((-plan.rays.start - self.t_center) as f32);
+        let mut u = start.max((-plan.rays().start - self.t_center) as f32);
         while u < end {
             let exit = overview.dark_around(self.center(u)).and_then(|region| self.leaves(region, u));
             // A leap must be worth it, and not be lost in rounding.

@@ -3,7 +3,8 @@
 use brickfield_core::BrickSide;
 use brickfield_core::glam::{UVec3, Vec3A};
 
-use crate::{IndexEntry, IndexGrid, MACROCELL_SIDE, Occupancy, chebyshev};
+use super::super::chebyshev;
+use crate::{IndexEntry, IndexGrid, MACROCELL_SIDE, Occupancy};
 
 /// Most cells of a lattice: 128^3.
 const MAX_CELLS: usize = 1 << 21;
@@ -59,7 +60,7 @@ pub(super) struct Region {
 impl Overview {
     /// The overview of an index of bricks and what is known of their macrocells; `None` if nothing is known to be dark.
     pub fn of(side: BrickSide, index: &IndexGrid, occupancy: Option<&Occupancy>) -> Option<Overview> {
-        if occupancy.is_none() && !index.has_transparent() {
+        if occupancy.is_none() && !index.has_empty() {
             return None;
         }
         let mut lattice = Lattice { n_brick: side.n_cells(), n_macrocells: Occupancy::n_macrocells(side), shift: 0 };
@@ -84,10 +85,10 @@ impl Overview {
             for y in 0..dims.y {
                 for x in 0..dims.x {
                     let cell = UVec3::new(x, y, z);
-                    let IndexEntry::Resident { slot, level } = index.at(cell) else { continue };
+                    let IndexEntry::Resident { slot, reach } = index.at(cell) else { continue };
                     // A coarse brick is marked once, from its lower corner.
-                    if cell & (level.stride() - 1) == UVec3::ZERO {
-                        self.mark_brick(occupancy, cell, slot, level.stride());
+                    if cell & (reach.n_cells() - 1) == UVec3::ZERO {
+                        self.mark_brick(occupancy, cell, slot, reach.n_cells());
                     }
                 }
             }

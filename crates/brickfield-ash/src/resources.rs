@@ -1,0 +1,222 @@
+//! What stays on the device: the contents that plans bring, by name.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use ash::vk;
+use brickfield_core::BrickSide;
+use brickfield_frame::{AtlasShape, Chunked, Content, FramePlan, FrameUniforms, HeldChunks, RenderError, Resource};
+use brickfield_shaders::{Binding, BindingKind};
+
+use crate::error::FailedCall;
+use crate::march::PIXEL_BYTES;
+use crate::staging::{Staging, Write};
+use crate::texture::Texture;
+use crate::vulkan::{Bindable, Buffer, Device, Pipeline, Queue, Sampler};
+
+/// The buffers and textures that shaders read and write.
+pub(crate) struct Resources {
+    device: Arc<Device>,
+    buffers: BTreeMap<Resource, Reused>,
+    textures: BTreeMap<Resource, Texture>,
+    sampler: Sampler,
+}
+
+/// A buffer that grows when it must, how much of it is used, and the chunks that are in it.
+pub(crate) struct Reused {
+    what: &'static str,
+    usage: vk::BufferUsageFlags,
+    used_bytes: u64,
+    buffer: Option<Buffer>,
+    held: HeldChunks,
+}
+
+/// What a plan has brought.
+pub(crate) struct Brought {
+    /// The frame's numbers, as for a single pass.
+    pub(crate) uniforms: FrameUniforms,
+    pub(crate) n_bytes: u64,
+}
+
+impl Resources {
+    /// Nothing yet.
+    pub(crate) fn new(device: &Arc<Device>) -> Result<Resources, FailedCall> {
+        Ok(Resources {
+            device: device.clone(),
+            buffers: BTreeMap::new(),
+            textures: BTreeMap::new(),
+            sampler: Sampler::linear(device)?,
+        })
+    }
+
+    /// Makes room for `n_bytes` in the buffer of a resource.
+    pub(crate) fn reserve(&mut self, resource: Resource, n_bytes: usize) -> Result<&Buffer, RenderError> {
+        let device = self.device.clone();
+        self.entry(resource).reserve(&device, n_bytes)
+    }
+
+    /// Makes room for what `n_pixels` rays saw in one pass, and the next must know.
+    pub(crate) fn reserve_rays(&mut self, n_pixels: u64) -> Result<(), RenderError> {
+        self.reserve(Resource::SeenBefore, n_pixels as usize * PIXEL_BYTES).map(drop)
+    }
+
+    /// The buffer of a resource, once there was something in it.
+    pub(crate) fn buffer(&self, resource: Resource) -> Option<&Buffer> {
+        self.buffers.get(&resource)?.buffer.as_ref()
+    }
+
+    fn entry(&mut self, resource: Resource) -> &mut Reused {
+        let usage = match resource {
+            Resource::Frame => vk::BufferUsageFlags::UNIFORM_BUFFER,
+            _ => vk::BufferUsageFlags::STORAGE_BUFFER,
+        };
+        self.buffers.entry(resource).or_insert_with(|| Reused::new(resource.name(), usage))
+    }
+
+    /// Brings to the device what `pipeline` reads of `plan`, as far as it is not there: numbers and lists in one submit.
+    pub(crate) fn bring(
+        &mut self,
+        queue: &mut Queue,
+        staging: &mut Staging,
+        plan: &FramePlan,
+        pipeline: &Pipeline,
+    ) -> Result<Brought, RenderError> {
+        let device = self.device.clone();
+        let (mut n_bytes, mut numbers, mut lists) = (0, Vec::new(), Vec::new());
+        for Binding { resource, .. } in pipeline.bindings() {
+            match plan.content(*resource) {
+                Some(Content::Bytes(bytes)) => numbers.push((*resource, bytes)),
+                Some(Content::Chunks(chunks)) => lists.push((*resource, chunks)),
+                Some(Content::Texture(slots)) => {
+                    let filtered = pipeline.has(BindingKind::Sampler);
+                    let texture = self.textures.remove(resource);
+                    let mut texture = Texture::with_room(&device, queue, slots, filtered, texture)?;
+                    n_bytes += texture.upload(queue, staging, slots)?;
+                    self.textures.insert(*resource, texture);
+                }
+                None => {}
+            }
+        }
+        let uniforms = FrameUniforms::of(plan, self.atlas_shape(plan));
+        if pipeline.uses(Resource::Frame) {
+            numbers.push((Resource::Frame, Cow::Borrowed(bytemuck::bytes_of(&uniforms))));
+        }
+        for (resource, bytes) in &numbers {
+            self.entry(*resource).reserve(&device, bytes.len())?;
+        }
+        for (resource, chunks) in &lists {
+            self.entry(*resource).make_room(&device, queue, *chunks)?;
+        }
+        n_bytes += self.fill(queue, staging, &numbers, &lists)?;
+        for (resource, chunks) in lists {
+            self.entry(resource).held.hold(chunks);
+        }
+        Ok(Brought { uniforms, n_bytes })
+    }
+
+    /// Fills buffers that have room.
+    fn fill(
+        &self,
+        queue: &mut Queue,
+        staging: &mut Staging,
+        numbers: &[(Resource, Cow<'_, [u8]>)],
+        lists: &[(Resource, &dyn Chunked)],
+    ) -> Result<u64, RenderError> {
+        let mut writes = Vec::new();
+        for (resource, bytes) in numbers {
+            let target = self.buffer(*resource).ok_or_else(|| missing(*resource))?;
+            writes.push(Write { target, offset: 0, bytes });
+        }
+        for (resource, chunks) in lists {
+            let target = self.buffer(*resource).ok_or_else(|| missing(*resource))?;
+            let runs = self.buffers[resource].held.missing(*chunks);
+            let of = |i: usize| {
+                let (_, bytes) = chunks.chunk(i)?;
+                Some(Write { target, offset: (i * chunks.chunk_bytes()) as u64, bytes })
+            };
+            writes.extend(runs.into_iter().flatten().filter_map(of));
+        }
+        staging.fill(queue, &writes)?;
+        Ok(writes.iter().map(|w| w.bytes.len() as u64).sum())
+    }
+
+    /// How the slots of a plan lie in the atlas; that of one brick if no shader reads it.
+    fn atlas_shape(&self, plan: &FramePlan) -> AtlasShape {
+        let shape = self.textures.get(&Resource::Atlas).and_then(Texture::atlas_shape);
+        let side = plan.field().slots().brick_side();
+        shape.filter(|s| Some(s.side) == side).unwrap_or(AtlasShape::least(side.unwrap_or(BrickSide::S16)))
+    }
+
+    /// What a shader's binding stands for.
+    pub(crate) fn bindable(&self, binding: &Binding) -> Option<Bindable<'_>> {
+        match binding.kind {
+            BindingKind::Uniform | BindingKind::StorageRead | BindingKind::StorageReadWrite => {
+                self.buffers.get(&binding.resource)?.bindable()
+            }
+            BindingKind::Texture3d => Some(Bindable::Texture(self.textures.get(&binding.resource)?.image())),
+            BindingKind::Sampler => Some(Bindable::Sampler(&self.sampler)),
+            BindingKind::StorageImage => None,
+        }
+    }
+}
+
+/// A shader reads a resource that nobody brought.
+pub(crate) fn missing(resource: Resource) -> RenderError {
+    RenderError::Shader { message: format!("it reads `{}`, which the plan does not bring", resource.name()) }
+}
+
+impl Reused {
+    /// Without a buffer yet.
+    pub(crate) fn new(what: &'static str, usage: vk::BufferUsageFlags) -> Reused {
+        Reused { what, usage, used_bytes: 0, buffer: None, held: HeldChunks::default() }
+    }
+
+    /// The buffer, of at least `n_bytes` bytes; its content is lost if it had to grow.
+    pub(crate) fn reserve(&mut self, device: &Arc<Device>, n_bytes: usize) -> Result<&Buffer, RenderError> {
+        let n_bytes = (n_bytes as u64).max(16);
+        self.check(device, n_bytes)?;
+        self.used_bytes = n_bytes;
+        if self.buffer.take_if(|b| b.n_bytes() < n_bytes).is_some() {
+            self.held.forget();
+        }
+        match &mut self.buffer {
+            Some(buffer) => Ok(buffer),
+            none => Ok(none.insert(Buffer::on_device(device, self.what, n_bytes, self.usage)?)),
+        }
+    }
+
+    /// Makes room for chunks beside those that are there; a buffer that must grow gets a quarter more than it had.
+    fn make_room(&mut self, device: &Arc<Device>, queue: &mut Queue, content: &dyn Chunked) -> Result<(), RenderError> {
+        let n_bytes = content.n_bytes();
+        let Some(old) = self.buffer.take_if(|b| b.n_bytes() < n_bytes) else {
+            return self.reserve(device, n_bytes as usize).map(drop);
+        };
+        self.check(device, n_bytes)?;
+        self.used_bytes = n_bytes;
+        let limit = u64::from(device.physical().limits.max_storage_buffer_range);
+        let size = n_bytes.max((old.n_bytes() + old.n_bytes() / 4).next_multiple_of(4).min(limit));
+        let larger = Buffer::on_device(device, self.what, size, self.usage)?;
+        queue.run("moving a list", |recorder| recorder.copy((&old, 0), (&larger, 0), old.n_bytes()))?;
+        self.buffer = Some(larger);
+        Ok(())
+    }
+
+    fn check(&self, device: &Device, n_bytes: u64) -> Result<(), RenderError> {
+        let limit = u64::from(device.physical().limits.max_storage_buffer_range);
+        match n_bytes > limit && self.usage.contains(vk::BufferUsageFlags::STORAGE_BUFFER) {
+            true => Err(RenderError::BufferTooLarge { what: self.what, n_bytes, limit }),
+            false => Ok(()),
+        }
+    }
+
+    /// The buffer, once something was reserved.
+    pub(crate) fn buffer(&self) -> Option<&Buffer> {
+        self.buffer.as_ref()
+    }
+
+    /// The used bytes as a shader's binding; `None` if nothing was reserved.
+    fn bindable(&self) -> Option<Bindable<'_>> {
+        self.buffer.as_ref().map(|buffer| Bindable::Buffer { buffer, n_bytes: self.used_bytes })
+    }
+}

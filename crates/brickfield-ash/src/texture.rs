@@ -1,0 +1,208 @@
+//! The samples of slots in a 3-D texture.
+
+use std::sync::Arc;
+
+use ash::vk;
+use brickfield_core::glam::UVec3;
+use brickfield_frame::{AtlasShape, Chunked, HeldChunks, Places, RenderError, SampleFormat, Slots};
+
+use crate::staging::Staging;
+use crate::vulkan::{Device, Image, ImageBox, Queue, Use, vulkan_format};
+
+/// A texture that holds slots.
+pub(crate) struct Texture {
+    image: Image,
+    shape: Shape,
+    format: SampleFormat,
+    held: HeldChunks,
+}
+
+/// How slots lie in it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Shape {
+    Atlas(AtlasShape),
+    /// As the table of their places says.
+    Table(UVec3),
+}
+
+/// An atlas with so many times the room that slots need is replaced by a smaller one.
+const TOO_LARGE: u32 = 8;
+/// Slots lie in staging memory at multiples of so many bytes.
+const ALIGNMENT: usize = 16;
+
+impl Texture {
+    /// A texture with room for slots: the old one, or one to which its contents are copied, or an empty one.
+    pub(crate) fn with_room(
+        device: &Arc<Device>,
+        queue: &mut Queue,
+        slots: &Slots,
+        filtered: bool,
+        old: Option<Texture>,
+    ) -> Result<Texture, RenderError> {
+        check_format(device, slots.format(), filtered)?;
+        let limit = device.physical().limits.max_image_dimension3_d;
+        let old = old.filter(|old| old.format == slots.format());
+        let mut empty = |shape| Texture::empty(device, queue, shape, slots.format());
+        match (slots.places(), old) {
+            (_, Some(old)) if old.held.has_all(slots) => Ok(old),
+            (Places::Table { texels, .. }, Some(old)) if old.shape == Shape::Table(*texels) => Ok(old),
+            (Places::Table { texels, .. }, old) => {
+                drop(old);
+                match texels.max_element() <= limit {
+                    true => empty(Shape::Table(*texels)),
+                    false => Err(RenderError::TextureTooLarge { texels: *texels, limit }),
+                }
+            }
+            (Places::Even(side), old) => {
+                let needed = slots.n_slots();
+                let old = old.and_then(|old| Some((old.atlas_shape().filter(|s| s.side == *side)?, old)));
+                let too_large = RenderError::AtlasTooLarge { n_bricks: needed, side: side.n_samples(), limit };
+                let least = slots.atlas(limit).ok_or(too_large)?;
+                match old {
+                    Some((shape, old)) if shape.n_bricks() >= needed && shape.n_bricks() / TOO_LARGE <= needed => {
+                        Ok(old)
+                    }
+                    Some((shape, old)) if shape.n_bricks() < needed => match shape.grown(needed, limit) {
+                        Some(grown) => old.grown(device, queue, grown),
+                        None => empty(Shape::Atlas(least)),
+                    },
+                    old => {
+                        // Both may not fit the device.
+                        drop(old);
+                        empty(Shape::Atlas(least))
+                    }
+                }
+            }
+        }
+    }
+
+    /// How bricks lie in it.
+    pub(crate) fn atlas_shape(&self) -> Option<AtlasShape> {
+        match self.shape {
+            Shape::Atlas(shape) => Some(shape),
+            Shape::Table(_) => None,
+        }
+    }
+
+    /// The image that shaders read.
+    pub(crate) fn image(&self) -> &Image {
+        &self.image
+    }
+
+    /// A texture of zeros: where there is no slot, a filter may still read with weight 0, and must find no NaN.
+    fn empty(
+        device: &Arc<Device>,
+        queue: &mut Queue,
+        shape: Shape,
+        format: SampleFormat,
+    ) -> Result<Texture, RenderError> {
+        let image = Image::texture_3d(device, format, shape.texels())?;
+        queue.run("preparing the atlas", |recorder| {
+            recorder.image_barrier(&image, Use::Nothing, Use::CopyTarget);
+            recorder.clear(&image);
+            recorder.image_barrier(&image, Use::CopyTarget, Use::ShaderRead);
+        })?;
+        Ok(Texture { image, shape, format, held: HeldChunks::default() })
+    }
+
+    /// A larger atlas with this one's bricks at their places; without them if both do not fit the device.
+    fn grown(self, device: &Arc<Device>, queue: &mut Queue, shape: AtlasShape) -> Result<Texture, RenderError> {
+        let larger = match Texture::empty(device, queue, Shape::Atlas(shape), self.format) {
+            Err(RenderError::OutOfMemory { .. }) => {
+                let format = self.format;
+                drop(self);
+                return Texture::empty(device, queue, Shape::Atlas(shape), format);
+            }
+            larger => larger?,
+        };
+        queue.run("moving the atlas", |recorder| {
+            recorder.image_barrier(&self.image, Use::ShaderRead, Use::CopySource);
+            recorder.image_barrier(&larger.image, Use::ShaderRead, Use::CopyTarget);
+            recorder.copy_image(&self.image, &larger.image);
+            recorder.image_barrier(&larger.image, Use::CopyTarget, Use::ShaderRead);
+        })?;
+        Ok(Texture { held: self.held, ..larger })
+    }
+
+    /// Writes the slots that are not there; their bytes.
+    pub(crate) fn upload(
+        &mut self,
+        queue: &mut Queue,
+        staging: &mut Staging,
+        slots: &Slots,
+    ) -> Result<u64, RenderError> {
+        let missing: Vec<u32> = self.held.missing(slots).into_iter().flatten().map(|slot| slot as u32).collect();
+        let mut n_bytes = 0;
+        if !missing.is_empty() {
+            let image = &self.image;
+            queue.run("opening the atlas", |recorder| {
+                recorder.image_barrier(image, Use::ShaderRead, Use::CopyTarget);
+            })?;
+            let slot_bytes = slots.chunk_bytes().next_multiple_of(ALIGNMENT);
+            for some in missing.chunks(staging.pieces_at_once(slot_bytes)) {
+                n_bytes += self.copy(queue, staging, slots, some)?;
+            }
+            staging.shrink();
+            queue.run("finishing the atlas", |recorder| {
+                recorder.image_barrier(image, Use::CopyTarget, Use::ShaderRead);
+            })?;
+        }
+        self.held.hold(slots);
+        Ok(n_bytes)
+    }
+
+    fn copy(&self, queue: &mut Queue, staging: &mut Staging, slots: &Slots, some: &[u32]) -> Result<u64, RenderError> {
+        let slot_bytes = slots.chunk_bytes().next_multiple_of(ALIGNMENT);
+        let buffer = staging.upload(slot_bytes * some.len())?;
+        let (mut boxes, mut n_bytes) = (Vec::with_capacity(some.len()), 0);
+        for (i, slot) in some.iter().enumerate() {
+            let Some(samples) = slots.samples(*slot) else { continue };
+            buffer.write(i * slot_bytes, samples.bytes());
+            n_bytes += samples.bytes().len() as u64;
+            boxes.push(self.place(slots, *slot, (i * slot_bytes) as u64));
+        }
+        let buffer = &*buffer;
+        let texel_bytes = self.format.n_bytes() as u64;
+        queue.run("uploading samples", |recorder| recorder.fill(buffer, &self.image, texel_bytes, &boxes))?;
+        Ok(n_bytes)
+    }
+
+    /// From a slot's place in staging memory to its place in the texture.
+    fn place(&self, slots: &Slots, slot: u32, buffer_offset: u64) -> ImageBox {
+        let (origin, extent) = match (self.shape, slots.places()) {
+            (_, Places::Table { places, .. }) => (places[slot as usize].texel, places[slot as usize].n),
+            (Shape::Atlas(shape), Places::Even(side)) => (shape.origin(slot), UVec3::splat(side.n_samples())),
+            (Shape::Table(_), Places::Even(side)) => (UVec3::ZERO, UVec3::splat(side.n_samples())),
+        };
+        ImageBox { buffer_offset, origin, extent }
+    }
+}
+
+impl Shape {
+    fn texels(self) -> UVec3 {
+        match self {
+            Shape::Atlas(shape) => shape.texels(),
+            Shape::Table(texels) => texels,
+        }
+    }
+}
+
+/// Checks that shaders can read a format, through a filter if they use a sampler.
+fn check_format(device: &Device, format: SampleFormat, filtered: bool) -> Result<(), RenderError> {
+    let what = match (format, filtered) {
+        (SampleFormat::Unorm8, false) => "read textures of 8-bit samples",
+        (SampleFormat::Unorm8, true) => "filter textures of 8-bit samples, as fast mode does",
+        (SampleFormat::Unorm16, false) => "read textures of 16-bit samples",
+        (SampleFormat::Unorm16, true) => "filter textures of 16-bit samples, as fast mode does",
+        (SampleFormat::Float32, false) => "read textures of 32-bit floats",
+        (SampleFormat::Float32, true) => "filter textures of 32-bit floats, as fast mode does",
+    };
+    let needed = match filtered {
+        true => vk::FormatFeatureFlags::SAMPLED_IMAGE | vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR,
+        false => vk::FormatFeatureFlags::SAMPLED_IMAGE,
+    };
+    match device.format_features(vulkan_format(format)).contains(needed) {
+        true => Ok(()),
+        false => Err(RenderError::Unsupported { what }),
+    }
+}

@@ -1,0 +1,238 @@
+//! The field that a plan draws: a value for every position.
+//!
+//! Three questions, kept apart:
+//!
+//! - **Index** ([`IndexGrid`]): from a position to a slot, and how far that answer reaches.
+//! - **Place** ([`Places`]): where a slot's samples lie in the texture and in space, and how far apart they are.
+//! - **Join** ([`Join`]): how a value between two slots comes about.
+
+mod atlas;
+mod index;
+mod slots;
+
+use std::sync::Arc;
+
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{Aabb, Level, Place};
+
+pub use atlas::AtlasShape;
+pub use index::{IndexEntry, IndexGrid, IndexLattice, Reach};
+pub use slots::{Decode, Places, SampleFormat, Slots, SlotsError};
+
+/// The field of a plan. Shares its parts with the fields of other frames.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Field {
+    dims: UVec3,
+    index: Arc<IndexGrid>,
+    slots: Arc<Slots>,
+    join: Join,
+}
+
+/// How a value between two slots comes about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Join {
+    /// Slots share their border samples: every position lies in one slot (LaMar, Hamann and Joy 1999, section 3.1).
+    #[default]
+    Shared,
+}
+
+/// Parts that do not make a field.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum FieldError {
+    #[error("a volume of {dims} samples: every side must be at least 1")]
+    NoSamples { dims: UVec3 },
+    #[error(
+        "an index of {index} cells for a volume of {dims} samples, whose cells of {cell_samples} samples are {expected}"
+    )]
+    IndexDims { index: UVec3, dims: UVec3, cell_samples: u32, expected: UVec3 },
+    #[error("the index names slot {slot}, which holds no samples: there are {n_slots} slots")]
+    NoSuchSlot { slot: u32, n_slots: u32 },
+    #[error("an index of cells of {cell_samples} samples for bricks of {side} samples, which have {} cells", side - 1)]
+    CellOfBricks { cell_samples: u32, side: u32 },
+}
+
+impl Field {
+    /// A field over a volume of `dims` samples.
+    ///
+    /// # Errors
+    /// A volume without samples; an index that does not cover it, or that names a slot without samples; evenly placed bricks
+    /// of another size than the index's cells.
+    pub fn new(dims: UVec3, index: Arc<IndexGrid>, slots: Arc<Slots>, join: Join) -> Result<Field, FieldError> {
+        if dims.min_element() == 0 {
+            return Err(FieldError::NoSamples { dims });
+        }
+        let lattice = index.lattice();
+        let expected = lattice.n_cells(dims);
+        if index.dims() != expected {
+            let cell_samples = lattice.cell_samples;
+            return Err(FieldError::IndexDims { index: index.dims(), dims, cell_samples, expected });
+        }
+        if let Some(slot) = index.slots().find(|slot| slots.samples(*slot).is_none()) {
+            return Err(FieldError::NoSuchSlot { slot, n_slots: slots.n_slots() });
+        }
+        match slots.places() {
+            Places::Even(side) if side.n_cells() != lattice.cell_samples => {
+                Err(FieldError::CellOfBricks { cell_samples: lattice.cell_samples, side: side.n_samples() })
+            }
+            _ => Ok(Field { dims, index, slots, join }),
+        }
+    }
+
+    /// A field of parts that may not fit.
+    pub(crate) fn unchecked(dims: UVec3, index: Arc<IndexGrid>, slots: Arc<Slots>, join: Join) -> Field {
+        Field { dims, index, slots, join }
+    }
+
+    /// Samples of the volume along x, y, z, at level 0.
+    #[inline]
+    pub fn dims(&self) -> UVec3 {
+        self.dims
+    }
+
+    /// From a position to a slot.
+    #[inline]
+    pub fn index(&self) -> &Arc<IndexGrid> {
+        &self.index
+    }
+
+    /// The samples.
+    #[inline]
+    pub fn slots(&self) -> &Arc<Slots> {
+        &self.slots
+    }
+
+    /// How a value between two slots comes about.
+    #[inline]
+    pub fn join(&self) -> Join {
+        self.join
+    }
+
+    /// The last sample of the volume, in sample space: positions are clamped to [0, last].
+    #[inline]
+    pub fn last_sample(&self) -> DVec3 {
+        (self.dims - 1).as_dvec3()
+    }
+
+    /// The volume's box in sample space: half a sample beyond the outer ones.
+    pub fn volume_box(&self) -> Aabb {
+        Aabb { min: DVec3::splat(-0.5), max: self.dims.as_dvec3() - 0.5 }
+    }
+
+    /// The index cell that owns a position, which is clamped to the volume's samples.
+    #[inline]
+    pub fn cell_at(&self, sample_position: DVec3) -> UVec3 {
+        let lattice = self.index.lattice();
+        let past_first = sample_position.clamp(DVec3::ZERO, self.last_sample()) - lattice.origin;
+        // Truncation is floor where it is not negative, and 0 below.
+        (past_first / f64::from(lattice.cell_samples)).as_uvec3().min(self.index.dims() - 1)
+    }
+
+    /// The box that the block of an index cell owns, in sample space; without end where the index ends.
+    #[inline]
+    pub fn block_box(&self, cell: UVec3) -> Aabb {
+        let lattice = self.index.lattice();
+        let (low, high) = self.index.at(cell).reach().block(cell);
+        let face = |cell: UVec3| cell.as_dvec3() * f64::from(lattice.cell_samples) + lattice.origin;
+        Aabb {
+            min: DVec3::select(low.cmpeq(UVec3::ZERO), DVec3::NEG_INFINITY, face(low)),
+            max: DVec3::select(high.cmpge(self.index.dims()), DVec3::INFINITY, face(high)),
+        }
+    }
+
+    /// Where the samples of the block around an index cell lie; `None` if nothing is visible there.
+    ///
+    /// Of evenly placed bricks the texel is left at 0: backends choose their atlas.
+    #[inline]
+    pub fn place_at(&self, cell: UVec3) -> Option<Place> {
+        let IndexEntry::Resident { slot, reach } = self.index.at(cell) else { return None };
+        Some(match self.slots.places() {
+            Places::Even(side) => {
+                let lattice = self.index.lattice();
+                let first = reach.block(cell).0.as_dvec3() * f64::from(lattice.cell_samples) + lattice.origin;
+                let n = UVec3::splat(side.n_samples());
+                Place { texel: UVec3::ZERO, n, level: reach.level_of_brick(), first, axes: Default::default() }
+            }
+            Places::Table { places, .. } => places[slot as usize],
+        })
+    }
+
+    /// The resolution of the block around an index cell; of an empty one the finest.
+    #[inline]
+    pub fn level_at(&self, cell: UVec3) -> Level {
+        match (self.index.at(cell), self.slots.places()) {
+            (IndexEntry::Empty { .. }, _) => Level(0),
+            (IndexEntry::Resident { reach, .. }, Places::Even(_)) => reach.level_of_brick(),
+            (IndexEntry::Resident { slot, .. }, Places::Table { places, .. }) => places[slot as usize].level,
+        }
+    }
+
+    /// Whether any slot in the index is coarser than level 0.
+    pub fn has_coarse(&self) -> bool {
+        match self.slots.places() {
+            Places::Even(_) => self.index.resident_reaches().any(|reach| reach > Reach(0)),
+            Places::Table { places, .. } => self.index.slots().any(|slot| places[slot as usize].level > Level(0)),
+        }
+    }
+
+    /// Whether slots of different levels are in the index.
+    pub fn has_several_levels(&self) -> bool {
+        match self.slots.places() {
+            Places::Even(_) => self.index.resident_reaches().nth(1).is_some(),
+            Places::Table { places, .. } => {
+                let mut levels = self.index.slots().map(|slot| places[slot as usize].level);
+                levels.next().is_some_and(|first| levels.any(|level| level != first))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use brickfield_core::{Axes, BrickSide};
+
+    const LATTICE: IndexLattice = IndexLattice { cell_samples: 15, origin: 0.0 };
+
+    fn slots(n: usize) -> Arc<Slots> {
+        let bytes = vec![0; n * 4096];
+        let decode = Decode { scale: 255.0, offset: 0.0 };
+        Arc::new(Slots::even(BrickSide::S16, SampleFormat::Unorm8, decode, &bytes).unwrap())
+    }
+
+    fn index(dims: UVec3, slot: u32) -> Arc<IndexGrid> {
+        Arc::new(IndexGrid::new(dims, LATTICE, [(UVec3::ZERO, IndexEntry::Resident { slot, reach: Reach(0) })]))
+    }
+
+    fn error(dims: UVec3, index: Arc<IndexGrid>, slots: Arc<Slots>) -> String {
+        Field::new(dims, index, slots, Join::Shared).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn parts_that_do_not_fit_are_named() {
+        let (dims, cells) = (UVec3::new(31, 16, 1), UVec3::new(2, 1, 1));
+        assert!(Field::new(dims, index(cells, 0), slots(1), Join::Shared).is_ok());
+        assert!(error(dims, index(cells, 1), slots(1)).contains("names slot 1, which holds no samples: there are 1"));
+        assert!(error(UVec3::new(0, 1, 1), index(cells, 0), slots(1)).contains("every side must be at least 1"));
+        assert!(error(UVec3::splat(16), index(cells, 0), slots(1)).contains("whose cells of 15 samples are [1, 1, 1]"));
+        let of_32 = Slots::even(BrickSide::S32, SampleFormat::Unorm8, Decode { scale: 1.0, offset: 0.0 }, &[0; 32768]);
+        assert!(error(dims, index(cells, 0), Arc::new(of_32.unwrap())).contains("bricks of 32 samples, which have 31"));
+    }
+
+    #[test]
+    fn a_brick_begins_at_its_blocks_corner_and_has_its_reach_for_a_level() {
+        let dims = UVec3::new(61, 31, 16);
+        let entries = [(UVec3::new(2, 0, 0), IndexEntry::Resident { slot: 0, reach: Reach(1) })];
+        let index = Arc::new(IndexGrid::new(UVec3::new(4, 2, 1), LATTICE, entries));
+        let field = Field::new(dims, index, slots(1), Join::Shared).unwrap();
+        let place = field.place_at(UVec3::new(3, 1, 0)).unwrap();
+        assert_eq!((place.level, place.first, place.n), (Level(1), DVec3::new(30.0, 0.0, 0.0), UVec3::splat(16)));
+        assert_eq!(place.axes, Axes::Xyz);
+        assert!(field.place_at(UVec3::ZERO).is_none() && field.has_coarse() && !field.has_several_levels());
+        let b = field.block_box(UVec3::new(3, 1, 0));
+        assert_eq!((b.min.x, b.max.x, b.min.y), (30.0, f64::INFINITY, f64::NEG_INFINITY));
+        assert_eq!(field.cell_at(DVec3::new(45.0, -3.0, 99.0)), UVec3::new(3, 0, 0));
+    }
+}

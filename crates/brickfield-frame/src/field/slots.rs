@@ -1,0 +1,368 @@
+//! The samples that a frame needs, slot by slot.
+
+use std::sync::Arc;
+
+use brickfield_core::glam::UVec3;
+use brickfield_core::{BrickSide, Place, ScalarType, ValueRange};
+
+use crate::{AtlasShape, Chunk, Chunked, ContentId, PlaceUniform};
+
+/// How a sample is stored for a backend.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SampleFormat {
+    /// 8 bits, read as stored / 255.
+    Unorm8,
+    /// 16 bits, read as stored / 65535.
+    Unorm16,
+    /// 32-bit float, read as it is.
+    Float32,
+}
+
+impl SampleFormat {
+    /// The least format that holds every value of a scalar type that f32 arithmetic can tell apart.
+    pub fn of(scalar: ScalarType) -> SampleFormat {
+        match scalar {
+            ScalarType::U8 | ScalarType::I8 => SampleFormat::Unorm8,
+            ScalarType::U16 | ScalarType::I16 => SampleFormat::Unorm16,
+            ScalarType::U32 | ScalarType::I32 | ScalarType::F32 | ScalarType::F64 => SampleFormat::Float32,
+        }
+    }
+
+    /// How the native samples of `scalar` with values in `range` are stored: format and decoding.
+    ///
+    /// 8 and 16 bits keep their integers (signed ones shifted by half their range). 32-bit integers and f64 become f32
+    /// relative to the middle of the range and in units of half of it, so that the digits of f32 are spent on the range.
+    pub fn encoding(scalar: ScalarType, range: ValueRange) -> (SampleFormat, Decode) {
+        let format = SampleFormat::of(scalar);
+        let decode = match scalar {
+            ScalarType::U8 | ScalarType::U16 => Decode { scale: format.unit(), offset: 0.0 },
+            ScalarType::I8 => Decode { scale: format.unit(), offset: -128.0 },
+            ScalarType::I16 => Decode { scale: format.unit(), offset: -32768.0 },
+            ScalarType::U32 | ScalarType::I32 | ScalarType::F32 | ScalarType::F64 => {
+                let half = 0.5 * range.max - 0.5 * range.min;
+                Decode { scale: if half > 0.0 { half } else { 1.0 }, offset: 0.5 * range.max + 0.5 * range.min }
+            }
+        };
+        (format, decode)
+    }
+
+    /// Bytes of one sample.
+    pub const fn n_bytes(self) -> usize {
+        match self {
+            SampleFormat::Unorm8 => 1,
+            SampleFormat::Unorm16 => 2,
+            SampleFormat::Float32 => 4,
+        }
+    }
+
+    /// The stored integer that reads as 1; 1 for floats.
+    #[inline]
+    pub const fn unit(self) -> f64 {
+        match self {
+            SampleFormat::Unorm8 => 255.0,
+            SampleFormat::Unorm16 => 65535.0,
+            SampleFormat::Float32 => 1.0,
+        }
+    }
+
+    /// The number that a texture read returns for sample `i` of some bytes; exact.
+    #[inline]
+    pub fn read(self, bytes: &[u8], i: usize) -> f64 {
+        match self {
+            SampleFormat::Unorm8 => f64::from(bytes[i]) / 255.0,
+            SampleFormat::Unorm16 => f64::from(u16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]])) / 65535.0,
+            SampleFormat::Float32 => {
+                let b = &bytes[4 * i..4 * i + 4];
+                f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+            }
+        }
+    }
+}
+
+/// From the number that a texture read returns to the data value: value = read * scale + offset.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub struct Decode {
+    pub scale: f64,
+    pub offset: f64,
+}
+
+impl Decode {
+    /// The data value of a texture read.
+    #[inline]
+    pub fn value(self, read: f64) -> f64 {
+        read * self.scale + self.offset
+    }
+}
+
+/// Where the samples of all slots lie.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Places {
+    /// All slots are bricks of so many samples a side, which begin at the corner of their block and have its reach for a level:
+    /// arithmetic finds them, no table is read.
+    Even(BrickSide),
+    /// A place for each slot, in a texture of so many texels.
+    #[allow(missing_docs)]
+    Table { texels: UVec3, places: Vec<Place> },
+}
+
+/// The samples that a frame needs, in slots: little endian, x of the texture fastest. A slot may hold no samples.
+#[derive(Clone, Debug)]
+pub struct Slots {
+    format: SampleFormat,
+    decode: Decode,
+    places: Places,
+    samples: Vec<Option<Arc<Chunk>>>,
+    table: Option<PlaceTable>,
+    id: ContentId,
+}
+
+/// A table of places as shaders read it.
+#[derive(Clone, Debug)]
+struct PlaceTable {
+    rows: Vec<PlaceUniform>,
+    id: ContentId,
+}
+
+/// Slots are equal if their samples are.
+impl PartialEq for Slots {
+    fn eq(&self, other: &Slots) -> bool {
+        let of = |s: &Slots| (s.format, s.decode, s.samples.clone(), s.places.clone());
+        self.id == other.id || of(self) == of(other)
+    }
+}
+
+/// Samples that do not fill slots.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum SlotsError {
+    #[error("{n_bytes} bytes are not whole bricks of {brick_bytes} bytes")]
+    Bricks { n_bytes: usize, brick_bytes: usize },
+    #[error("slot {slot} has {n_bytes} bytes; its place has {expected}")]
+    Bytes { slot: usize, n_bytes: usize, expected: usize },
+    #[error("{n_places} places for {n_slots} slots")]
+    Places { n_places: usize, n_slots: usize },
+    #[error("slot {slot} lies at {} to {} in a texture of {texels} texels", place.texel, place.texel + place.n)]
+    Outside { slot: usize, place: Place, texels: UVec3 },
+}
+
+impl Slots {
+    /// Slots of given samples, at given places.
+    ///
+    /// # Errors
+    /// Samples that do not fill their place; a place that is missing, empty, or outside of its texture.
+    pub fn new(
+        format: SampleFormat,
+        decode: Decode,
+        places: Places,
+        samples: Vec<Option<Arc<Chunk>>>,
+    ) -> Result<Slots, SlotsError> {
+        match &places {
+            Places::Even(side) => {
+                let expected = side.n_samples_total() * format.n_bytes();
+                check_bytes(&samples, |_| expected)?;
+            }
+            Places::Table { texels, places } => {
+                let (n_places, n_slots) = (places.len(), samples.len());
+                if n_places != n_slots {
+                    return Err(SlotsError::Places { n_places, n_slots });
+                }
+                let is_outside = |p: &Place| p.n.min_element() == 0 || (p.texel + p.n).cmpgt(*texels).any();
+                if let Some((slot, place)) = places.iter().enumerate().find(|(_, p)| is_outside(p)) {
+                    return Err(SlotsError::Outside { slot, place: *place, texels: *texels });
+                }
+                check_bytes(&samples, |slot| places[slot].n_samples() * format.n_bytes())?;
+            }
+        }
+        let table = match &places {
+            Places::Even(_) => None,
+            Places::Table { places, .. } => {
+                Some(PlaceTable { rows: places.iter().map(PlaceUniform::of).collect(), id: ContentId::new() })
+            }
+        };
+        Ok(Slots { format, decode, places, samples, table, id: ContentId::new() })
+    }
+
+    /// Bricks of one size, whose bytes follow one another.
+    ///
+    /// # Errors
+    /// If the bytes are not whole bricks.
+    pub fn even(side: BrickSide, format: SampleFormat, decode: Decode, bytes: &[u8]) -> Result<Slots, SlotsError> {
+        let brick_bytes = side.n_samples_total() * format.n_bytes();
+        if !bytes.len().is_multiple_of(brick_bytes) {
+            return Err(SlotsError::Bricks { n_bytes: bytes.len(), brick_bytes });
+        }
+        let samples = bytes.chunks_exact(brick_bytes).map(|brick| Some(Arc::new(Chunk::new(brick)))).collect();
+        Slots::new(format, decode, Places::Even(side), samples)
+    }
+
+    /// How a sample is stored.
+    #[inline]
+    pub fn format(&self) -> SampleFormat {
+        self.format
+    }
+
+    /// From a texture read to the data value.
+    #[inline]
+    pub fn decode(&self) -> Decode {
+        self.decode
+    }
+
+    /// Where the samples lie.
+    #[inline]
+    pub fn places(&self) -> &Places {
+        &self.places
+    }
+
+    /// The side of evenly placed bricks.
+    pub fn brick_side(&self) -> Option<BrickSide> {
+        match self.places {
+            Places::Even(side) => Some(side),
+            Places::Table { .. } => None,
+        }
+    }
+
+    /// The table of places as shaders read it ([`PlaceUniform`]); `None` where arithmetic finds them.
+    pub fn place_table(&self) -> Option<&dyn Chunked> {
+        self.table.as_ref().map(|table| table as &dyn Chunked)
+    }
+
+    /// Number of slots, those without samples included.
+    pub fn n_slots(&self) -> u32 {
+        self.samples.len() as u32
+    }
+
+    /// Number of slots that hold samples.
+    pub fn n_filled(&self) -> usize {
+        self.samples.iter().flatten().count()
+    }
+
+    /// Bytes of all samples.
+    pub fn n_bytes(&self) -> usize {
+        self.samples.iter().flatten().map(|chunk| chunk.bytes().len()).sum()
+    }
+
+    /// The samples of a slot; `None` if there are none.
+    #[inline]
+    pub fn samples(&self, slot: u32) -> Option<&Arc<Chunk>> {
+        self.samples.get(slot as usize)?.as_ref()
+    }
+
+    /// The samples of all slots.
+    pub fn all_samples(&self) -> &[Option<Arc<Chunk>>] {
+        &self.samples
+    }
+
+    /// The stored integer nearest to a data value; counted from it, f32 keeps the most digits of samples near the value.
+    /// 0 for floats.
+    pub fn nearest_stored(&self, value: f64) -> f64 {
+        let unit = self.format.unit();
+        match self.format {
+            SampleFormat::Unorm8 | SampleFormat::Unorm16 => {
+                ((value - self.decode.offset) / self.decode.scale * unit).round().clamp(0.0, unit)
+            }
+            SampleFormat::Float32 => 0.0,
+        }
+    }
+
+    /// The smallest atlas of evenly placed bricks in a texture of at most `max_texels` a side; `None` if no such atlas can hold
+    /// them.
+    pub fn atlas(&self, max_texels: u32) -> Option<AtlasShape> {
+        AtlasShape::fit(self.n_slots(), self.brick_side()?, max_texels)
+    }
+}
+
+fn check_bytes(samples: &[Option<Arc<Chunk>>], expected: impl Fn(usize) -> usize) -> Result<(), SlotsError> {
+    let filled = samples.iter().enumerate().filter_map(|(slot, chunk)| Some((slot, chunk.as_ref()?)));
+    for (slot, chunk) in filled {
+        let (n_bytes, expected) = (chunk.bytes().len(), expected(slot));
+        if n_bytes != expected {
+            return Err(SlotsError::Bytes { slot, n_bytes, expected });
+        }
+    }
+    Ok(())
+}
+
+impl Chunked for Slots {
+    fn id(&self) -> ContentId {
+        self.id
+    }
+
+    /// Of a brick; of slots of several sizes the largest one's.
+    fn chunk_bytes(&self) -> usize {
+        let n_samples = match &self.places {
+            Places::Even(side) => side.n_samples_total(),
+            Places::Table { places, .. } => places.iter().map(Place::n_samples).max().unwrap_or(0),
+        };
+        n_samples * self.format.n_bytes()
+    }
+
+    fn n_chunks(&self) -> usize {
+        self.samples.len()
+    }
+
+    fn chunk(&self, i: usize) -> Option<(ContentId, &[u8])> {
+        self.samples[i].as_ref().map(|chunk| (chunk.id(), chunk.bytes()))
+    }
+}
+
+impl Chunked for PlaceTable {
+    fn id(&self) -> ContentId {
+        self.id
+    }
+
+    fn chunk_bytes(&self) -> usize {
+        size_of_val(&self.rows[..])
+    }
+
+    fn n_chunks(&self) -> usize {
+        1
+    }
+
+    fn chunk(&self, _: usize) -> Option<(ContentId, &[u8])> {
+        Some((self.id, bytemuck::cast_slice(&self.rows)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use brickfield_core::glam::DVec3;
+    use brickfield_core::{Axes, Level};
+
+    #[test]
+    fn encodings_keep_integers_and_centre_wide_types() {
+        let range = ValueRange { min: 1e9, max: 1e9 + 4.0 };
+        let (format, decode) = SampleFormat::encoding(ScalarType::I32, range);
+        assert_eq!((format, decode.value(-1.0), decode.value(1.0)), (SampleFormat::Float32, 1e9, 1e9 + 4.0));
+        let (_, decode) = SampleFormat::encoding(ScalarType::I16, range);
+        assert_eq!(decode.value(0.0), -32768.0);
+        assert_eq!(decode.value(1.0), 32767.0);
+    }
+
+    #[test]
+    fn the_nearest_stored_integer_stays_in_the_format() {
+        let (format, decode) = SampleFormat::encoding(ScalarType::I16, ValueRange { min: 0.0, max: 0.0 });
+        let slots = Slots::even(BrickSide::S16, format, decode, &[]).unwrap();
+        let expected = [(0.0, 32768.0), (-1.4, 32767.0), (1e9, 65535.0), (-1e9, 0.0)];
+        assert!(expected.into_iter().all(|(value, stored)| slots.nearest_stored(value) == stored));
+    }
+
+    #[test]
+    fn samples_that_do_not_fill_their_places_are_named() {
+        let decode = Decode { scale: 1.0, offset: 0.0 };
+        let even = Slots::even(BrickSide::S16, SampleFormat::Unorm8, decode, &[0; 4097]).unwrap_err().to_string();
+        assert!(even.contains("4097 bytes are not whole bricks of 4096"), "{even}");
+        let place =
+            |texel| Place { texel, n: UVec3::new(2, 3, 1), level: Level(0), first: DVec3::ZERO, axes: Axes::Xyz };
+        let table = |texel, n_bytes| {
+            let places = Places::Table { texels: UVec3::splat(4), places: vec![place(texel)] };
+            let samples = vec![Some(Arc::new(Chunk::new(vec![0; n_bytes])))];
+            Slots::new(SampleFormat::Unorm8, decode, places, samples).map(|slots| slots.n_bytes())
+        };
+        assert_eq!(table(UVec3::new(2, 1, 3), 6), Ok(6));
+        assert_eq!(table(UVec3::ZERO, 5), Err(SlotsError::Bytes { slot: 0, n_bytes: 5, expected: 6 }));
+        assert!(table(UVec3::new(2, 2, 0), 6).unwrap_err().to_string().contains("in a texture of [4, 4, 4] texels"));
+    }
+}

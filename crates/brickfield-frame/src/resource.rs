@@ -1,0 +1,137 @@
+//! What shaders read and write, by name.
+
+use std::borrow::Cow;
+
+use crate::{Chunked, FramePlan, KnotUniform, Slots};
+
+/// A buffer, texture or sampler, by the name that it has in shaders (`frame.wesl`).
+///
+/// To add one that a plan brings: a name here, its content in [`FramePlan::content`], its declaration in the shaders. Backends bind
+/// whatever a shader names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Resource {
+    /// The frame's numbers ([`FrameUniforms`](crate::FrameUniforms)).
+    Frame,
+    /// The samples of all slots, a 3-D texture.
+    Atlas,
+    /// How the atlas is filtered: linearly, clamped to the edge.
+    AtlasSampler,
+    /// The packed entries of the index.
+    Index,
+    /// Where each slot's samples lie, for slots of several sizes.
+    Places,
+    /// The transfer function's knots.
+    Knots,
+    /// The picture that rays are stored to.
+    Picture,
+    /// The inputs of an evaluated function.
+    Inputs,
+    /// The outputs of an evaluated function.
+    Outputs,
+    /// The emission and depth that earlier passes saw of each ray.
+    SeenBefore,
+    /// Distances of macrocells, negative for visible ones ([`Occupancy`](crate::Occupancy)).
+    Occupancy,
+    /// For each tile of pixels, the segments in which its rays may see something ([`Beams`](crate::Beams)).
+    Beams,
+    /// The blocks that polygons are clipped to ([`ProxyGeometry`](crate::ProxyGeometry)).
+    Drawn,
+    /// The planes of the facets of tessellated shells.
+    Facets,
+}
+
+/// What a plan brings for a resource.
+pub enum Content<'a> {
+    /// Numbers of this frame, brought with every frame.
+    Bytes(Cow<'a, [u8]>),
+    /// A list that frames share: what a device holds of it is not brought again.
+    Chunks(&'a dyn Chunked),
+    /// Samples as a 3-D texture; of them, too, what a device holds is not brought again.
+    Texture(&'a Slots),
+}
+
+impl Resource {
+    /// All resources.
+    pub const ALL: [Resource; 14] = [
+        Resource::Frame,
+        Resource::Atlas,
+        Resource::AtlasSampler,
+        Resource::Index,
+        Resource::Places,
+        Resource::Knots,
+        Resource::Picture,
+        Resource::Inputs,
+        Resource::Outputs,
+        Resource::SeenBefore,
+        Resource::Occupancy,
+        Resource::Beams,
+        Resource::Drawn,
+        Resource::Facets,
+    ];
+
+    /// The name in shaders and messages.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Resource::Frame => "frame",
+            Resource::Atlas => "atlas",
+            Resource::AtlasSampler => "atlas_sampler",
+            Resource::Index => "index",
+            Resource::Places => "places",
+            Resource::Knots => "knots",
+            Resource::Picture => "picture",
+            Resource::Inputs => "inputs",
+            Resource::Outputs => "outputs",
+            Resource::SeenBefore => "seen_before",
+            Resource::Occupancy => "occupancy",
+            Resource::Beams => "beams",
+            Resource::Drawn => "drawn",
+            Resource::Facets => "facets",
+        }
+    }
+
+    /// The resource of a name.
+    pub fn of_name(name: &str) -> Option<Resource> {
+        Resource::ALL.into_iter().find(|resource| resource.name() == name)
+    }
+}
+
+impl FramePlan {
+    /// What the plan brings for a resource; `None` for what it does not have, and for what backends bring themselves: the frame's
+    /// numbers (they depend on the atlas and the pass), pictures, inputs and results.
+    pub fn content(&self, resource: Resource) -> Option<Content<'_>> {
+        let bytes = |bytes: &[u8]| Some(Content::Bytes(Cow::Owned(bytes.to_vec())));
+        match resource {
+            Resource::Atlas => Some(Content::Texture(self.field.slots())),
+            Resource::Index => Some(Content::Chunks(&**self.field.index())),
+            Resource::Places => self.field.slots().place_table().map(Content::Chunks),
+            Resource::Knots => bytes(bytemuck::cast_slice(&KnotUniform::of(self))),
+            Resource::Occupancy => self.occupancy.as_ref().map(|occupancy| Content::Chunks(&**occupancy)),
+            Resource::Beams => self.beams.as_ref().and_then(|beams| bytes(bytemuck::cast_slice(&beams.spans()))),
+            Resource::Drawn => {
+                let proxy = self.proxy.as_ref()?;
+                Some(Content::Bytes(Cow::Borrowed(bytemuck::cast_slice(proxy.bricks()))))
+            }
+            Resource::Facets => bytes(bytemuck::cast_slice(&self.rays.facet_planes())),
+            Resource::Frame
+            | Resource::AtlasSampler
+            | Resource::Picture
+            | Resource::Inputs
+            | Resource::Outputs
+            | Resource::SeenBefore => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique() {
+        for resource in Resource::ALL {
+            assert_eq!(Resource::of_name(resource.name()), Some(resource));
+        }
+        assert_eq!(Resource::of_name("nothing"), None);
+    }
+}

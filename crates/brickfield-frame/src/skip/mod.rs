@@ -1,0 +1,12 @@
+//! What rays need not look at.
+
+mod beams;
+mod chebyshev;
+mod dark;
+mod macrocells;
+mod occupancy;
+
+pub use beams::{Beams, Overview};
+pub use dark::{DarkError, DarkRegions};
+pub use macrocells::MacrocellRanges;
+pub use occupancy::{MACROCELL_SIDE, Occupancy};

@@ -1,0 +1,129 @@
+//! What stays on the device: the contents that plans bring, by name, and the picture.
+
+use std::collections::BTreeMap;
+
+use brickfield_core::BrickSide;
+use brickfield_core::glam::UVec2;
+use brickfield_frame::{AtlasShape, Content, FramePlan, FrameUniforms, RenderError, Resource};
+use brickfield_shaders::{Binding, BindingKind};
+use wgpu::BufferUsages;
+
+use crate::buffer::Reused;
+use crate::device::Device;
+use crate::picture::{Maker, Picture};
+use crate::pipeline::Pipeline;
+use crate::texture::Texture;
+
+/// What shaders read and write.
+pub(crate) struct Resources {
+    buffers: BTreeMap<Resource, Reused>,
+    textures: BTreeMap<Resource, Texture>,
+    sampler: wgpu::Sampler,
+    pub(crate) picture: Option<Picture>,
+}
+
+/// What a plan has brought.
+pub(crate) struct Brought {
+    /// The frame's numbers, as for a single pass.
+    pub(crate) uniforms: FrameUniforms,
+    pub(crate) n_bytes: u64,
+}
+
+impl Resources {
+    pub(crate) fn new(device: &Device) -> Resources {
+        let linear = wgpu::FilterMode::Linear;
+        let sampler = wgpu::SamplerDescriptor {
+            label: Some("atlas"),
+            mag_filter: linear,
+            min_filter: linear,
+            ..wgpu::SamplerDescriptor::default()
+        };
+        Resources {
+            buffers: BTreeMap::new(),
+            textures: BTreeMap::new(),
+            sampler: device.device.create_sampler(&sampler),
+            picture: None,
+        }
+    }
+
+    /// The buffer of a resource.
+    pub(crate) fn buffer(&mut self, resource: Resource) -> &mut Reused {
+        let usage = match resource {
+            Resource::Frame => BufferUsages::UNIFORM,
+            _ => BufferUsages::STORAGE,
+        };
+        let usage = usage | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+        self.buffers.entry(resource).or_insert_with(|| Reused::new(resource.name(), usage))
+    }
+
+    /// Brings to the device what `pipeline` reads of `plan`, as far as it is not there.
+    pub(crate) fn bring(
+        &mut self,
+        device: &Device,
+        plan: &FramePlan,
+        pipeline: &Pipeline,
+    ) -> Result<Brought, RenderError> {
+        let mut n_bytes = 0;
+        for Binding { resource, .. } in &pipeline.bindings {
+            n_bytes += match plan.content(*resource) {
+                Some(Content::Bytes(bytes)) => self.buffer(*resource).write(device, &bytes)?,
+                Some(Content::Chunks(chunks)) => self.buffer(*resource).bring(device, chunks)?,
+                Some(Content::Texture(slots)) => Texture::bring(device, slots, &mut self.textures, *resource)?,
+                None => 0,
+            };
+        }
+        let uniforms = FrameUniforms::of(plan, self.atlas_shape(plan));
+        if pipeline.uses(Resource::Frame) {
+            n_bytes += self.buffer(Resource::Frame).write(device, bytemuck::bytes_of(&uniforms))?;
+        }
+        Ok(Brought { uniforms, n_bytes })
+    }
+
+    /// How the slots of a plan lie in the atlas; that of one brick if no shader reads it.
+    fn atlas_shape(&self, plan: &FramePlan) -> AtlasShape {
+        let shape = self.textures.get(&Resource::Atlas).and_then(Texture::atlas_shape);
+        let side = plan.field().slots().brick_side();
+        shape.filter(|s| Some(s.side) == side).unwrap_or(AtlasShape::least(side.unwrap_or(BrickSide::S16)))
+    }
+
+    pub(crate) fn resize(&mut self, device: &Device, size: UVec2, maker: Maker) -> Result<(), RenderError> {
+        if !self.picture.as_ref().is_some_and(|p| p.fits(size, maker)) {
+            self.picture = None;
+            self.picture = Some(Picture::new(device, size, maker)?);
+        }
+        Ok(())
+    }
+
+    fn binding(&self, binding: &Binding) -> Option<wgpu::BindingResource<'_>> {
+        let resource = &binding.resource;
+        match binding.kind {
+            BindingKind::Uniform | BindingKind::StorageRead | BindingKind::StorageReadWrite => {
+                self.buffers.get(resource)?.binding()
+            }
+            BindingKind::Texture3d => Some(wgpu::BindingResource::TextureView(&self.textures.get(resource)?.view)),
+            BindingKind::Sampler => Some(wgpu::BindingResource::Sampler(&self.sampler)),
+            BindingKind::StorageImage => Some(wgpu::BindingResource::TextureView(&self.picture.as_ref()?.view)),
+        }
+    }
+
+    /// Everything that a pipeline reads and writes.
+    pub(crate) fn bind(&self, device: &Device, pipeline: &Pipeline) -> Result<wgpu::BindGroup, RenderError> {
+        let entry = |b: &Binding| {
+            let resource = self.binding(b).ok_or_else(|| missing(b.resource))?;
+            Ok(wgpu::BindGroupEntry { binding: b.index, resource })
+        };
+        let entries = pipeline.bindings.iter().map(entry).collect::<Result<Vec<_>, RenderError>>()?;
+        device.checked("binding resources", 0, || {
+            device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("frame"),
+                layout: &pipeline.layout,
+                entries: &entries,
+            })
+        })
+    }
+}
+
+/// A shader reads a resource that nobody brought.
+pub(crate) fn missing(resource: Resource) -> RenderError {
+    RenderError::Shader { message: format!("it reads `{}`, which the plan does not bring", resource.name()) }
+}

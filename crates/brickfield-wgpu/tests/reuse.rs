@@ -1,0 +1,202 @@
+//! What frames share stays on the device, and nothing that is old is drawn. Prints `no device` where there is none.
+
+mod support;
+
+use std::sync::Arc;
+
+use brickfield_core::glam::{DVec3, UVec2, UVec3};
+use brickfield_core::{BrickSide, Camera, Grid, Knot, Projection, TransferFunction};
+use brickfield_frame::{
+    Backend, Chunk, DarkRegions, Decode, Drawing, Evaluate, Feature, Field, Frame, FramePlan, IndexEntry, IndexGrid,
+    IndexLattice, Join, MacrocellRanges, Mode, Occupancy, Places, PlanParts, QuadratureRule, RayFrame, Reach,
+    SampleFormat, Sampling, ShaderFunction, Slots, Steps,
+};
+use brickfield_wgpu::WgpuBackend;
+use support::backend;
+
+const SIDE: BrickSide = BrickSide::S16;
+const FORMAT: SampleFormat = SampleFormat::Float32;
+const DECODE: Decode = Decode { scale: 1.0, offset: 0.0 };
+const BRICK_BYTES: u64 = 4 * 16 * 16 * 16;
+/// Index, beams, uniforms and knots are fewer.
+const NUMBERS_BYTES: u64 = 8 << 10;
+const N_BRICKS: u32 = 9;
+const CELLS: UVec3 = UVec3::new(3, 3, 1);
+const DIMS: UVec3 = UVec3::new(46, 46, 16);
+const DARK: f32 = -1.0;
+
+/// A brick of a tone, and its macrocells' distances. No two tones have a visible value in common, or are dark in the same places.
+#[derive(Clone)]
+struct Brick {
+    samples: Arc<Chunk>,
+    distances: Arc<Chunk>,
+}
+
+fn brick(tone: u32) -> Brick {
+    let value = |x: u32, y: u32, z: u32| match (x + 5 * tone) % 16 {
+        0..6 => DARK,
+        _ => tone as f32 + (x + 2 * y + 3 * z) as f32 / 128.0,
+    };
+    let bytes: Vec<u8> = (0..4096).flat_map(|i| value(i % 16, i / 16 % 16, i / 256).to_le_bytes()).collect();
+    let distances = MacrocellRanges::of(SIDE, FORMAT, &bytes).distances(DECODE, &fog());
+    Brick { samples: Arc::new(Chunk::new(bytes)), distances: Arc::new(distances) }
+}
+
+fn bricks(tones: impl IntoIterator<Item = u32>) -> Vec<Option<Brick>> {
+    tones.into_iter().map(|tone| Some(brick(tone))).collect()
+}
+
+/// So thin that the far side of a brick is seen; every value has a colour of its own.
+fn fog() -> TransferFunction {
+    let knot = |value: f64, extinction, color| Knot { value, extinction, color };
+    let (red, green) = ([1.0, 0.0, 0.1], [0.0, 1.0, 0.9]);
+    let knots = vec![knot(-0.5, 0.0, red), knot(0.0, 0.05, red), knot(16.0, 0.05, green)];
+    TransferFunction::new(knots).unwrap()
+}
+
+/// The cell of the index that a slot is drawn in: slots follow one another in another order than cells.
+fn cell(slot: u32) -> UVec3 {
+    let i = (4 * slot + 2) % N_BRICKS;
+    UVec3::new(i % CELLS.x, i / CELLS.x, 0)
+}
+
+/// The field of some bricks by their slots; where there is none it is empty.
+fn field(bricks: &[Option<Brick>]) -> Field {
+    let lattice = IndexLattice { cell_samples: SIDE.n_cells(), origin: 0.0 };
+    let filled = (0u32..).zip(bricks).filter(|(_, brick)| brick.is_some()).map(|(slot, _)| slot);
+    let entries = filled.map(|slot| (cell(slot), IndexEntry::Resident { slot, reach: Reach(0) }));
+    let index = IndexGrid::new(CELLS, lattice, entries);
+    let samples = bricks.iter().map(|brick| brick.as_ref().map(|b| b.samples.clone())).collect();
+    let slots = Slots::new(FORMAT, DECODE, Places::Even(SIDE), samples).unwrap();
+    Field::new(DIMS, Arc::new(index), Arc::new(slots), Join::Shared).unwrap()
+}
+
+/// A picture of some bricks, from a side where none is behind another.
+fn parts(bricks: &[Option<Brick>]) -> PlanParts {
+    let (field, grid) = (field(bricks), Grid::axis_aligned(DIMS, DVec3::ONE).unwrap());
+    let (center, domain) = (grid.world_box().center(), field.volume_box());
+    let projection = Projection::Orthographic { height: 46.0 };
+    let camera = Camera::look_at(center - DVec3::Z * 20.0, center, DVec3::Y, projection).unwrap();
+    let sampling = Sampling::new(0.5, QuadratureRule::MidpointExponential, Mode::Exact).unwrap();
+    PlanParts {
+        field,
+        rays: RayFrame::new(&camera, &grid, UVec2::splat(46), &domain, &Steps::shells(sampling.step_world())),
+        domain,
+        sampling,
+        transfer: fog(),
+        dark: DarkRegions::default(),
+        drawing: Drawing::Rays,
+    }
+}
+
+fn plan(bricks: &[Option<Brick>]) -> FramePlan {
+    FramePlan::new(parts(bricks)).unwrap()
+}
+
+/// The same, with leaps over what is dark inside of bricks.
+fn leaping(bricks: &[Option<Brick>]) -> FramePlan {
+    let parts = parts(bricks);
+    let distances = bricks.iter().map(|brick| brick.as_ref().map(|b| b.distances.clone())).collect();
+    let dark = DarkRegions::new(&parts.field, Occupancy::new(SIDE, distances)).unwrap();
+    FramePlan::new(PlanParts { dark, ..parts }).unwrap()
+}
+
+/// The frame of a plan of some bricks, which is a fresh backend's, and in which each brick lies where it belongs.
+#[track_caller]
+fn frame(backend: &mut WgpuBackend, plan: &FramePlan, bricks: &[Option<Brick>]) -> Frame {
+    let frame = backend.render(plan).unwrap();
+    let local = UVec3::new(7, 4, 11);
+    let at = |slot: u32| (cell(slot) * SIDE.n_cells() + local).as_vec3().extend(0.0).to_array();
+    let inputs: Vec<_> = (0..bricks.len() as u32).map(at).collect();
+    let samples = backend.evaluate(plan, ShaderFunction::Sample, &inputs).unwrap();
+    for (slot, (brick, found)) in bricks.iter().zip(samples).enumerate() {
+        let i = (local.x + 16 * (local.y + 16 * local.z)) as usize;
+        let stored = |brick: &Brick| FORMAT.read(brick.samples.bytes(), i) as f32;
+        let [expected, resident] = brick.as_ref().map_or([0.0; 2], |brick| [stored(brick), 1.0]);
+        assert!((found[0] - expected).abs() < 1e-5 && found[1] == resident, "slot {slot}: {found:?}, not {expected}");
+    }
+    let fresh = support::backend().unwrap().render(plan).unwrap();
+    assert!(frame.image == fresh.image, "a fresh backend has another picture");
+    frame
+}
+
+#[test]
+fn one_brick_in_anothers_place_is_brought_alone() {
+    let Some(mut backend) = backend() else { return };
+    let mut bricks = bricks(0..N_BRICKS);
+    let mut before = frame(&mut backend, &plan(&bricks), &bricks);
+    assert!(before.uploaded_bytes >= u64::from(N_BRICKS) * BRICK_BYTES);
+    for (slot, tone) in [(0, 10), (4, 11), (8, 12), (4, 13)] {
+        bricks[slot] = Some(brick(tone));
+        let after = frame(&mut backend, &plan(&bricks), &bricks);
+        assert!(after.image != before.image, "slot {slot}: its brick is not seen");
+        let n_bytes = after.uploaded_bytes;
+        assert!((BRICK_BYTES..3 * BRICK_BYTES + NUMBERS_BYTES).contains(&n_bytes), "slot {slot}: {n_bytes} bytes");
+        before = after;
+    }
+}
+
+#[test]
+fn an_atlas_that_grows_keeps_its_bricks() {
+    let Some(mut backend) = backend() else { return };
+    grow(&mut backend, plan);
+}
+
+/// So do the lists of macrocells' distances; and to leap changes nothing.
+#[test]
+fn leaps_are_over_the_dark_of_the_bricks_that_are_there() {
+    let Some(mut backend) = backend() else { return };
+    grow(&mut backend, leaping);
+    let mut bricks = bricks(0..N_BRICKS);
+    for (slot, tone) in [(0, 10), (4, 11), (8, 12)] {
+        bricks[slot] = Some(brick(tone));
+        let plan = leaping(&bricks);
+        assert!(plan.features().contains(Feature::SkipMacrocells));
+        let leapt = frame(&mut backend, &plan, &bricks).image;
+        let whole = backend.render(&self::plan(&bricks)).unwrap().image;
+        let pairs = leapt.pixels().iter().flatten().zip(whole.pixels().iter().flatten());
+        let worst = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(worst <= 1e-6, "slot {slot}: {worst:e}");
+    }
+}
+
+fn grow(backend: &mut WgpuBackend, plan: fn(&[Option<Brick>]) -> FramePlan) {
+    let bricks = bricks(0..N_BRICKS);
+    let mut n_held = 0;
+    for n in [2, 3, 9, 2, 9] {
+        let n_bytes = frame(backend, &plan(&bricks[..n]), &bricks[..n]).uploaded_bytes;
+        let n_new = n.saturating_sub(n_held) as u64;
+        let most = n_new * BRICK_BYTES + NUMBERS_BYTES;
+        assert!((n_new * BRICK_BYTES..most).contains(&n_bytes), "{n} bricks, {n_new} of them new: {n_bytes} bytes");
+        n_held = n_held.max(n);
+    }
+}
+
+/// What a device is thought to hold must still be there, whatever was brought for frames in between.
+#[test]
+fn bricks_that_were_not_drawn_for_a_while_are_still_themselves() {
+    let Some(mut backend) = backend() else { return };
+    let (old, new) = (bricks(0..4), bricks(4..8));
+    // All slots but one are filled anew, and the one comes back: the last, while there are fewer slots, and one among others.
+    for (left_out, n_slots) in [(3, 3), (1, 4)] {
+        frame(&mut backend, &plan(&old), &old);
+        let mut bricks = new.clone();
+        bricks[left_out] = None;
+        frame(&mut backend, &plan(&bricks[..n_slots]), &bricks[..n_slots]);
+        bricks[left_out] = old[left_out].clone();
+        frame(&mut backend, &plan(&bricks), &bricks);
+    }
+}
+
+#[test]
+fn an_unchanged_plan_brings_its_numbers_only() {
+    let Some(mut backend) = backend() else { return };
+    let plan = plan(&bricks(0..N_BRICKS));
+    let first = backend.render(&plan).unwrap();
+    assert!(first.uploaded_bytes >= u64::from(N_BRICKS) * BRICK_BYTES);
+    for plan in [&plan, &plan.clone()] {
+        let again = backend.render(plan).unwrap();
+        assert!(again.image == first.image);
+        assert!((1..4 << 10).contains(&again.uploaded_bytes), "{} bytes", again.uploaded_bytes);
+    }
+}
