@@ -2,6 +2,7 @@
 
 mod architecture;
 mod ci;
+mod kept_out;
 mod layers;
 mod readme;
 mod setup;
@@ -60,7 +61,7 @@ enum Command {
     Speed(Passed),
     /// Run the benchmarks; arguments go to cargo bench
     Bench(Passed),
-    /// Hold the workspace to the arrows and the crate table of ARCHITECTURE.md
+    /// Hold the workspace to the arrows and the crate table of ARCHITECTURE.md, and each crate to what it must not bring
     Layers,
     /// Everything that must hold before a merge, in the order of how soon it fails
     Ci,
