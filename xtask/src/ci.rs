@@ -7,6 +7,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 
 use crate::layers::layers;
+use crate::package::package;
 use crate::readme::xtask_commands;
 use crate::spawn::{Spawn, cargo, root};
 
@@ -71,6 +72,7 @@ fn steps() -> Result<Vec<Step>> {
     let mut steps = vec![
         step("format", || cargo("fmt").args(["--all", "--check"]).run()),
         step("layers", layers),
+        step("packages", package),
         step("clippy", || {
             cargo("clippy").args(["--workspace", "--all-targets", "--all-features", "--", "--deny", "warnings"]).run()
         }),

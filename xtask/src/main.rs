@@ -4,6 +4,7 @@ mod architecture;
 mod ci;
 mod kept_out;
 mod layers;
+mod package;
 mod readme;
 mod setup;
 mod spawn;
@@ -63,6 +64,8 @@ enum Command {
     Bench(Passed),
     /// Hold the workspace to the arrows and the crate table of ARCHITECTURE.md, and each crate to what it must not bring
     Layers,
+    /// Make the packages as a registry would get them, and check that none lacks a licence, a readme or its description
+    Package,
     /// Everything that must hold before a merge, in the order of how soon it fails
     Ci,
 }
@@ -94,6 +97,7 @@ fn main() -> Result<ExitCode> {
         Command::Speed(passed) => Tool::Speed.run(&passed.typed()),
         Command::Bench(passed) => of_packages(cargo("bench").arg("--benches"), &passed.typed()),
         Command::Layers => layers::layers(),
+        Command::Package => package::package(),
         Command::Ci => ci::ci(),
     }
 }
