@@ -2,6 +2,7 @@
 
 mod architecture;
 mod ci;
+mod deny;
 mod kept_out;
 mod layers;
 mod package;
@@ -36,9 +37,10 @@ Environment:
 
 #[derive(Subcommand)]
 enum Command {
-    /// Say what this machine lacks (Vulkan loader, driver, validation layer, rustfmt, clippy), and install it if asked
+    /// Say what this machine lacks (Vulkan loader, driver, validation layer; for ci rustfmt, clippy, cargo-deny), and install
+    /// it if asked
     Setup {
-        /// Install without asking; by apt-get (with sudo if not root) and rustup
+        /// Install without asking; by apt-get (with sudo if not root), rustup and cargo
         #[arg(long)]
         yes: bool,
     },
@@ -64,6 +66,8 @@ enum Command {
     Bench(Passed),
     /// Hold the workspace to the arrows and the crate table of ARCHITECTURE.md, and each crate to what it must not bring
     Layers,
+    /// Hold all dependencies to deny.toml: licences, versions, sources, and advisories where their database can be had
+    Deny,
     /// Make the packages as a registry would get them, and check that none lacks a licence, a readme or its description
     Package,
     /// Everything that must hold before a merge, in the order of how soon it fails
@@ -97,6 +101,7 @@ fn main() -> Result<ExitCode> {
         Command::Speed(passed) => Tool::Speed.run(&passed.typed()),
         Command::Bench(passed) => of_packages(cargo("bench").arg("--benches"), &passed.typed()),
         Command::Layers => layers::layers(),
+        Command::Deny => deny::deny(),
         Command::Package => package::package(),
         Command::Ci => ci::ci(),
     }

@@ -31,6 +31,12 @@ pub(crate) fn package() -> Result<ExitCode> {
     Ok(if lacks.is_empty() { packed } else { ExitCode::FAILURE })
 }
 
+/// The names of the packages that may be published.
+pub(crate) fn published() -> Result<Vec<String>> {
+    let (published, _) = packages(&metadata()?)?;
+    Ok(published.iter().filter_map(|p| p["name"].as_str().map(str::to_owned)).collect())
+}
+
 /// `cargo package`, of the working tree as it is.
 fn pack(arguments: &[&str]) -> Spawn {
     cargo("package").arg("--allow-dirty").args(arguments)
