@@ -31,9 +31,7 @@ struct Options {
 const ENVIRONMENT: &str = "\
 Environment:
   BRICKFIELD_DATA: folder of real volumes, for tests and speed. Without it those cases are
-    reported as \"no data\" (with CI=true: those in ../shared/data, where that exists).
-  BRICKFIELD_XTASK_PROFILE: `release` (default) or `dev`, how compare, conformance, orders
-    and speed are built. dev shares its dependencies with `test`: CI compiles wgpu once.";
+    reported as \"no data\" (with CI=true: those in ../shared/data, where that exists).";
 
 #[derive(Subcommand)]
 enum Command {
