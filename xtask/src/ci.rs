@@ -6,23 +6,30 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 
+use crate::deny;
 use crate::layers::layers;
+use crate::package::{package, published};
 use crate::readme::xtask_commands;
 use crate::spawn::{Spawn, cargo, root};
 
 /// What README.md must show, and `ci` therefore runs.
 const PROMISED: [&str; 2] = ["compare", "test"];
 
+/// The package that asks for features of the others: those are checked without it.
+const FRONT_DOOR: &str = "brickfield";
+
 /// A named check.
 struct Step {
     name: String,
-    run: Run,
+    run: Box<dyn FnOnce() -> Result<Outcome>>,
 }
 
-enum Run {
-    Does(Box<dyn FnOnce() -> Result<ExitCode>>),
-    /// It needs real volumes, and `BRICKFIELD_DATA` names no folder of them.
-    NoData,
+/// What has become of a step.
+enum Outcome {
+    Held,
+    Failed,
+    /// What it needs is not to be had here. It counts as neither.
+    NotChecked(&'static str),
 }
 
 /// The command: runs all steps, whatever fails, and sums up.
@@ -32,56 +39,56 @@ pub(crate) fn ci() -> Result<ExitCode> {
     for step in steps()? {
         eprintln!("\nci: {}", step.name);
         let begin = Instant::now();
-        let good = match step.run {
-            Run::NoData => None,
-            Run::Does(run) => Some(succeeds(run)),
-        };
-        if good == Some(false) {
+        let outcome = (step.run)().unwrap_or_else(|error| {
+            eprintln!("ci: {error:#}");
+            Outcome::Failed
+        });
+        if let Outcome::Failed = outcome {
             all = ExitCode::FAILURE;
         }
-        let word = match good {
-            Some(true) => "ok",
-            Some(false) => "FAILED",
-            None => "no data",
-        };
-        lines.push(format!("ci: {word:<7} {:>6.1} s  {}", begin.elapsed().as_secs_f64(), step.name));
+        lines.push(format!("ci: {:<7} {:>6.1} s  {}", outcome.word(), begin.elapsed().as_secs_f64(), step.name));
         eprintln!("{}", lines[lines.len() - 1]);
     }
     eprintln!("\n{}", lines.join("\n"));
     Ok(all)
 }
 
-/// The steps, cheap ones first. Dependencies are checked once (clippy, doc) and compiled once: everything that runs is
-/// built in the dev profile, as part of one build of the whole workspace.
+/// The steps, cheap ones first. Dependencies are checked once (clippy, doc) and compiled once. Ours are compiled twice: as the
+/// tests are, where overflow is checked, and for README.md's first command as a person has them.
 fn steps() -> Result<Vec<Step>> {
     let mut steps = vec![
         step("format", || cargo("fmt").args(["--all", "--check"]).run()),
         step("layers", layers),
-        step("clippy", || cargo("clippy").args(["--workspace", "--all-targets", "--", "--deny", "warnings"]).run()),
-        step("without features", || {
-            cargo("check")
-                .args(["--package", "brickfield", "--package", "brickfield-io", "--no-default-features"])
-                .run()
+        step("packages", package),
+        step("dependencies", deny::packages),
+        step("advisories", || match deny::has_database() {
+            true => deny::advisories().map(Outcome::from),
+            false => Ok(Outcome::NotChecked("not checked: no database")),
         }),
+        step("clippy", || {
+            cargo("clippy").args(["--workspace", "--all-targets", "--all-features", "--", "--deny", "warnings"]).run()
+        }),
+        step("crates without features", || without_features(|name| name != FRONT_DOOR)),
+        step("front door without features", || without_features(|name| name == FRONT_DOOR)),
         step("documentation", || {
             cargo("doc").args(["--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "--deny warnings").run()
         }),
-        step("build", || cargo("build").args(["--workspace", "--all-targets"]).run()),
+        step("build", || cargo("test").args(["--workspace", "--no-run"]).run()),
     ];
     steps.extend(readme_steps()?);
-    steps.push(step("orders of accuracy", || xtask(&["orders"]).run()));
+    steps.push(step("orders of accuracy", || checked("orders", &[]).run()));
     steps.push(step("conformance, of the cases too", || {
-        xtask(&["conformance", "--require", "cpu,wgpu,ash", "--self-check"]).run()
+        checked("conformance", &["--require", "cpu,wgpu,ash", "--self-check"]).run()
     }));
-    let of_lamar = ["compare", "--paper", "lamar", "--check=pictures", "--require", "wgpu,ash"];
+    let of_lamar = ["--paper", "lamar", "--check=pictures", "--require", "wgpu,ash"];
     let claims = [&of_lamar[..], &["--part", "selection,seams,shells"]].concat();
-    steps.push(step("claims of LaMar, Hamann and Joy 1999", move || xtask(&claims).run()));
+    steps.push(step("claims of LaMar, Hamann and Joy 1999", move || checked("compare", &claims).run()));
     let views =
         [&of_lamar[..], &["--part", "views", "--views", "4", "--volume-side", "128", "--size", "48x48"]].concat();
-    steps.push(step("views of a pixel's error", move || xtask(&views).run()));
+    steps.push(step("views of a pixel's error", move || checked("compare", &views).run()));
     let rows = ["--part", "table", "--only", "engine", "--sides", "32", "--size", "96x96", "--frames", "1"];
     let table = [&of_lamar[..], &rows].concat();
-    steps.push(step_with_data("rows of LaMar's table", move || xtask(&table).run()));
+    steps.push(step_with_data("rows of LaMar's table", move || checked("compare", &table).run()));
     Ok(steps)
 }
 
@@ -100,29 +107,46 @@ fn readme_steps() -> Result<Vec<Step>> {
     Ok(promised.rev().collect())
 }
 
-fn step(name: &str, run: impl FnOnce() -> Result<ExitCode> + 'static) -> Step {
-    Step { name: name.to_owned(), run: Run::Does(Box::new(run)) }
+fn step<R: Into<Outcome>>(name: &str, run: impl FnOnce() -> Result<R> + 'static) -> Step {
+    Step { name: name.to_owned(), run: Box::new(|| run().map(Into::into)) }
 }
 
-/// A step that needs real volumes.
+/// A step that needs real volumes: `BRICKFIELD_DATA` names the folder.
 fn step_with_data(name: &str, run: impl FnOnce() -> Result<ExitCode> + 'static) -> Step {
-    match std::env::var_os("BRICKFIELD_DATA") {
-        Some(_) => step(name, run),
-        None => Step { name: name.to_owned(), run: Run::NoData },
-    }
+    step(name, || match std::env::var_os("BRICKFIELD_DATA") {
+        Some(_) => run().map(Outcome::from),
+        None => Ok(Outcome::NotChecked("no data")),
+    })
 }
 
-fn succeeds(run: impl FnOnce() -> Result<ExitCode>) -> bool {
-    match run() {
-        Ok(code) => code == ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("ci: {error:#}");
-            false
+impl Outcome {
+    fn word(&self) -> &'static str {
+        match self {
+            Outcome::Held => "ok",
+            Outcome::Failed => "FAILED",
+            Outcome::NotChecked(why) => why,
         }
     }
 }
 
+impl From<ExitCode> for Outcome {
+    fn from(code: ExitCode) -> Outcome {
+        if code == ExitCode::SUCCESS { Outcome::Held } else { Outcome::Failed }
+    }
+}
+
+/// Checks packages in a build that has none of their default features.
+fn without_features(wanted: fn(&str) -> bool) -> Result<ExitCode> {
+    let names = published()?.into_iter().filter(|name| wanted(name));
+    cargo("check").arg("--no-default-features").args(names.flat_map(|name| ["--package".to_owned(), name])).run()
+}
+
 /// A command of ours, as a person would type it.
 fn xtask(arguments: &[&str]) -> Spawn {
-    cargo("xtask").args(arguments).env("BRICKFIELD_XTASK_PROFILE", "dev")
+    cargo("xtask").args(arguments)
+}
+
+/// A program of the conformance crate, built as the tests are.
+fn checked(program: &str, arguments: &[&str]) -> Spawn {
+    cargo("run").args(["--profile", "test", "--bin", program, "--"]).args(arguments)
 }

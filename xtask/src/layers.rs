@@ -1,4 +1,4 @@
-//! Holds the workspace's packages to the arrows of ARCHITECTURE.md.
+//! Holds the workspace's packages to the arrows of ARCHITECTURE.md, and to what must not come with them.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -8,6 +8,7 @@ use anyhow::{Context, Result};
 use serde_json::Value;
 
 use crate::architecture::crates_in_table;
+use crate::kept_out::brought;
 use crate::spawn::{metadata, root};
 
 /// Which packages of the workspace a package may name, dev- and build-dependencies included. The only such table.
@@ -55,7 +56,10 @@ pub(crate) fn layers() -> Result<ExitCode> {
     let packages = packages(&metadata()?)?;
     let path = root().join("ARCHITECTURE.md");
     let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    let found = violations(&packages, &crates_in_table(&text));
+    let mut found = violations(&packages, &crates_in_table(&text));
+    for package in &packages {
+        found.extend(brought(&package.name)?);
+    }
     for violation in &found {
         eprintln!("layers: {violation}");
     }

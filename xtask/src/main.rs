@@ -2,7 +2,10 @@
 
 mod architecture;
 mod ci;
+mod deny;
+mod kept_out;
 mod layers;
+mod package;
 mod readme;
 mod setup;
 mod spawn;
@@ -28,15 +31,14 @@ struct Options {
 const ENVIRONMENT: &str = "\
 Environment:
   BRICKFIELD_DATA: folder of real volumes, for tests and speed. Without it those cases are
-    reported as \"no data\" (with CI=true: those in ../shared/data, where that exists).
-  BRICKFIELD_XTASK_PROFILE: `release` (default) or `dev`, how compare, conformance, orders
-    and speed are built. dev shares its dependencies with `test`: CI compiles wgpu once.";
+    reported as \"no data\" (with CI=true: those in ../shared/data, where that exists).";
 
 #[derive(Subcommand)]
 enum Command {
-    /// Say what this machine lacks (Vulkan loader, driver, validation layer, rustfmt, clippy), and install it if asked
+    /// Say what this machine lacks (Vulkan loader, driver, validation layer; for ci rustfmt, clippy, cargo-deny), and install
+    /// it if asked
     Setup {
-        /// Install without asking; by apt-get (with sudo if not root) and rustup
+        /// Install without asking; by apt-get (with sudo if not root), rustup and cargo
         #[arg(long)]
         yes: bool,
     },
@@ -60,8 +62,12 @@ enum Command {
     Speed(Passed),
     /// Run the benchmarks; arguments go to cargo bench
     Bench(Passed),
-    /// Hold the workspace to the arrows and the crate table of ARCHITECTURE.md
+    /// Hold the workspace to the arrows and the crate table of ARCHITECTURE.md, and each crate to what it must not bring
     Layers,
+    /// Hold all dependencies to deny.toml: licences, versions, sources, and advisories where their database can be had
+    Deny,
+    /// Make the packages as a registry would get them, and check that none lacks a licence, a readme or its description
+    Package,
     /// Everything that must hold before a merge, in the order of how soon it fails
     Ci,
 }
@@ -93,6 +99,8 @@ fn main() -> Result<ExitCode> {
         Command::Speed(passed) => Tool::Speed.run(&passed.typed()),
         Command::Bench(passed) => of_packages(cargo("bench").arg("--benches"), &passed.typed()),
         Command::Layers => layers::layers(),
+        Command::Deny => deny::deny(),
+        Command::Package => package::package(),
         Command::Ci => ci::ci(),
     }
 }

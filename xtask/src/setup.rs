@@ -37,9 +37,14 @@ enum Source {
     Rustup {
         component: &'static str,
     },
+    /// Built from crates.io.
+    Cargo {
+        package: &'static str,
+        version: &'static str,
+    },
 }
 
-const NEEDS: [Need; 5] = [
+const NEEDS: [Need; 6] = [
     Need {
         name: "Vulkan loader",
         purpose: "the wgpu and ash backends",
@@ -85,6 +90,22 @@ const NEEDS: [Need; 5] = [
         is_there: || answers("cargo-clippy"),
         from: Source::Rustup { component: "clippy" },
     },
+    Need {
+        name: "cargo-deny",
+        purpose: "cargo xtask ci",
+        is_there: || answers("cargo-deny"),
+        from: Source::Cargo { package: "cargo-deny", version: "0.20.2" },
+    },
+];
+
+/// Tools run for seconds: it is their build that should be quick.
+const QUICK_BUILD: [&str; 6] = [
+    "--config",
+    "profile.release.lto=false",
+    "--config",
+    "profile.release.codegen-units=16",
+    "--config",
+    "profile.release.opt-level=1",
 ];
 
 /// The command.
@@ -116,14 +137,25 @@ impl Need {
     fn debian(&self) -> Option<&'static str> {
         match self.from {
             Source::System { debian, .. } => Some(debian),
-            Source::Rustup { .. } => None,
+            Source::Rustup { .. } | Source::Cargo { .. } => None,
         }
     }
 
     fn component(&self) -> Option<&'static str> {
         match self.from {
-            Source::System { .. } => None,
             Source::Rustup { component } => Some(component),
+            Source::System { .. } | Source::Cargo { .. } => None,
+        }
+    }
+
+    /// The command that builds it.
+    fn cargo_install(&self) -> Option<Vec<String>> {
+        match self.from {
+            Source::Cargo { package, version } => {
+                let words = ["cargo", "install", "--locked", package, "--version", version];
+                Some(words.iter().chain(&QUICK_BUILD).map(|w| (*w).to_owned()).collect())
+            }
+            Source::System { .. } | Source::Rustup { .. } => None,
         }
     }
 }
@@ -144,6 +176,7 @@ fn commands(missing: &[&Need]) -> Vec<Vec<String>> {
     if !components.is_empty() {
         commands.push(words(&["rustup", "component", "add"], &components));
     }
+    commands.extend(missing.iter().filter_map(|n| n.cargo_install()));
     commands
 }
 
@@ -174,6 +207,7 @@ fn name_packages(missing: &[&Need]) {
                 need.name
             ),
             Source::Rustup { component } => eprintln!("setup: rustup component add {component}"),
+            Source::Cargo { package, .. } => eprintln!("setup: cargo install --locked {package}"),
         }
     }
 }
@@ -253,7 +287,8 @@ mod tests {
         let lines: Vec<String> = commands(&all).iter().map(|c| c.join(" ")).collect();
         assert!(lines[1].ends_with("libvulkan1 mesa-vulkan-drivers vulkan-validationlayers"), "{lines:?}");
         assert_eq!(lines[2], "rustup component add rustfmt clippy");
-        assert_eq!(commands(&all[3..]).len(), 1);
+        assert!(lines[3].starts_with("cargo install --locked cargo-deny --version 0.20.2"), "{lines:?}");
+        assert_eq!(commands(&all[3..5]).len(), 1);
         assert_eq!(commands(&[]).len(), 0);
     }
 }

@@ -19,13 +19,6 @@ pub(crate) enum Tool {
     Speed,
 }
 
-/// How the tools are built.
-enum Profile {
-    Release,
-    /// Together with the whole workspace and its tests, so that features, and with them dependencies, are the same.
-    Dev,
-}
-
 /// A cargo command.
 pub(crate) fn cargo(subcommand: &str) -> Spawn {
     let mut spawn = Spawn::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
@@ -97,42 +90,13 @@ impl Tool {
         }
     }
 
-    /// Builds and runs the tool.
+    /// Builds and runs the tool. Without `--package`, so that it has the features of the whole workspace, as the tests have:
+    /// with others, cargo would compile its dependencies for each.
     pub(crate) fn run(self, arguments: &[String]) -> Result<ExitCode> {
-        let package = ["--package", "brickfield-conformance", "--bin", self.name()];
         // `cargo xtask compare -- --help`: the dashes were for us.
         let arguments = arguments.strip_prefix(&["--".to_owned()]).unwrap_or(arguments);
-        match profile()? {
-            Profile::Release => cargo("run").arg("--release").args(package).arg("--").args(arguments).run(),
-            Profile::Dev => {
-                let built = cargo("build").args(["--workspace", "--all-targets"]).run()?;
-                if built != ExitCode::SUCCESS {
-                    return Ok(built);
-                }
-                let program =
-                    target_folder()?.join("debug").join(format!("{}{}", self.name(), env::consts::EXE_SUFFIX));
-                let spawn = Spawn::new(program).args(arguments);
-                match data_folder() {
-                    Some(data) => spawn.env("BRICKFIELD_DATA", &data.to_string_lossy()).run(),
-                    None => spawn.run(),
-                }
-            }
-        }
+        cargo("run").args(["--bin", self.name(), "--"]).args(arguments).run()
     }
-}
-
-fn profile() -> Result<Profile> {
-    match env::var("BRICKFIELD_XTASK_PROFILE").as_deref() {
-        Err(_) | Ok("" | "release") => Ok(Profile::Release),
-        Ok("dev") => Ok(Profile::Dev),
-        Ok(other) => bail!("BRICKFIELD_XTASK_PROFILE is {other:?}; it must be `release` or `dev`"),
-    }
-}
-
-fn target_folder() -> Result<PathBuf> {
-    let metadata: serde_json::Value = serde_json::from_str(&metadata()?)?;
-    let folder = metadata["target_directory"].as_str().context("cargo metadata names no target_directory")?;
-    Ok(folder.into())
 }
 
 /// What cargo says about the workspace, as JSON.

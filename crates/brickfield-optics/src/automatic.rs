@@ -1,9 +1,8 @@
 //! A transfer function chosen from a volume's histogram.
 
-use brickfield_core::{Knot, LinearRgb, TransferFunction, Volume};
+use brickfield_core::{Grid, Knot, LinearRgb, TransferFunction, Volume};
 
 use crate::histogram::{Classes, Histogram, otsu_cuts, triangle_foot};
-use crate::presets::diagonal_world;
 
 /// A transfer function in which the thing in the volume is likely to be recognised, found from its histogram alone.
 ///
@@ -32,6 +31,11 @@ pub fn automatic(volume: &Volume) -> TransferFunction {
         knots(&background, &materials(&histogram, &background, volume))
     };
     TransferFunction::new(knots).unwrap_or_else(|e| unreachable!("knots of a histogram are in order: {e}"))
+}
+
+/// Length of a volume's diagonal in world units: the length over which relative presets measure their depth.
+pub fn diagonal_world(grid: &Grid) -> f64 {
+    (grid.dims().as_dvec3() * grid.spacing()).length()
 }
 
 const GRAY: LinearRgb = [0.5; 3];
@@ -117,7 +121,7 @@ fn knots(background: &Background, materials: &[Material]) -> Vec<Knot> {
 mod tests {
     use super::*;
     use brickfield_core::glam::{DVec3, UVec3};
-    use brickfield_core::{Grid, Scalar, ValueRange};
+    use brickfield_core::{Scalar, ValueRange};
     use proptest::prelude::*;
 
     fn cube<T: Scalar>(side: u32, spacing: f64, value: impl Fn(UVec3) -> T) -> Volume {

@@ -1,19 +1,26 @@
 #![doc = include_str!("../README.md")]
 
 mod automatic;
+#[cfg(feature = "color")]
 mod difference;
 mod histogram;
 mod opacity;
+#[cfg(feature = "color")]
 mod presets;
 mod quadrature;
+#[cfg(feature = "color")]
 mod srgb;
+#[cfg(feature = "files")]
 mod transfer_file;
 
-pub use automatic::automatic;
+pub use automatic::{automatic, diagonal_world};
+#[cfg(feature = "color")]
 pub use difference::{ColorDifferences, ColorMetric, PixelCountError};
 pub use opacity::{OPAQUE_DEPTH, alpha, depth, rescale_alpha, transmittance};
-pub use presets::{Preset, PresetScale, diagonal_world};
+#[cfg(feature = "color")]
+pub use presets::{Preset, PresetScale};
 pub use quadrature::{QuadratureRule, RayState, Segment, preintegrate};
+#[cfg(feature = "files")]
 pub use transfer_file::{
     KnotProblem, ParseTransferError, ReadTransferError, TransferFormat, WriteTransferError, parse_transfer,
     read_transfer, write_transfer,

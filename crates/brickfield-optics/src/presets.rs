@@ -1,7 +1,8 @@
 //! Named transfer functions: for Hounsfield units, and relative to a volume's range and size.
 
-use brickfield_core::{Grid, Knot, TransferError, TransferFunction, ValueRange, Volume};
+use brickfield_core::{Knot, TransferError, TransferFunction, ValueRange, Volume};
 
+use crate::automatic::diagonal_world;
 use crate::srgb::linear_of_hex;
 
 /// A transfer function with a name.
@@ -34,11 +35,6 @@ pub enum Preset {
     Plasma,
     /// Cool to warm: diverging from blue through grey, where it is transparent, to red (Moreland 2009).
     CoolWarm,
-}
-
-/// Length of a volume's diagonal in world units: the length over which relative presets measure their depth.
-pub fn diagonal_world(grid: &Grid) -> f64 {
-    (grid.dims().as_dvec3() * grid.spacing()).length()
 }
 
 impl Preset {

@@ -14,7 +14,7 @@ pub struct Machine {
     pub n_threads: usize,
     /// Operating system and architecture.
     pub os: String,
-    /// `release`, or `debug` (whose times say little).
+    /// `optimized`, or `checked`: with debug assertions, and times that say little.
     pub build: String,
 }
 
@@ -25,7 +25,7 @@ impl Machine {
             cpu: cpu_name().unwrap_or_else(|| "unknown".to_owned()),
             n_threads: std::thread::available_parallelism().map_or(1, |n| n.get()),
             os: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
-            build: if cfg!(debug_assertions) { "debug" } else { "release" }.to_owned(),
+            build: if cfg!(debug_assertions) { "checked" } else { "optimized" }.to_owned(),
         }
     }
 }
