@@ -2,9 +2,10 @@
 
 use brickfield_core::BrickSide;
 use brickfield_core::glam::{UVec3, Vec3A};
+use rayon::prelude::*;
 
 use super::super::chebyshev;
-use crate::{IndexEntry, IndexGrid, MACROCELL_SIDE, Occupancy};
+use crate::{IndexEntry, IndexGrid, MACROCELL_SIDE, Occupancy, Reach};
 
 /// Most cells of a lattice: 128^3.
 const MAX_CELLS: usize = 1 << 21;
@@ -43,6 +44,25 @@ impl Lattice {
         (brick * self.n_macrocells + (sample - brick * self.n_brick) / MACROCELL_SIDE) >> self.shift
     }
 
+    /// Sets the cells of a brick of level 0 that hold visible macrocells to 0; all of them if nothing is known of its
+    /// macrocells. Rows and layers of cells are so far apart.
+    fn mark_fine(&self, cells: &mut [u8], [row, layer]: [usize; 2], distances: Option<&[i8]>) {
+        let n = self.n_macrocells as usize;
+        let Some(distances) = distances else {
+            let n_cells = n >> self.shift;
+            for (z, y) in (0..n_cells).flat_map(|z| (0..n_cells).map(move |y| (z, y))) {
+                cells[z * layer + y * row..][..n_cells].fill(0);
+            }
+            return;
+        };
+        for (i, distances) in distances.chunks_exact(n).enumerate() {
+            let cells = &mut cells[((i / n) >> self.shift) * layer + ((i % n) >> self.shift) * row..];
+            for (x, _) in distances.iter().enumerate().filter(|(_, d)| **d < 0) {
+                cells[x >> self.shift] = 0;
+            }
+        }
+    }
+
     /// Where a cell begins.
     fn edge(&self, cell: u32) -> u32 {
         let macrocell = cell << self.shift;
@@ -78,21 +98,38 @@ impl Overview {
         Some(overview)
     }
 
-    /// Sets what may show something to 0.
+    /// Sets cells that may show something to 0.
     fn mark(&mut self, index: &IndexGrid, occupancy: Option<&Occupancy>) {
         let dims = index.dims();
-        for z in 0..dims.z {
-            for y in 0..dims.y {
-                for x in 0..dims.x {
-                    let cell = UVec3::new(x, y, z);
-                    let IndexEntry::Resident { slot, reach } = index.at(cell) else { continue };
-                    // A coarse brick is marked once, from its lower corner.
-                    if cell & (reach.n_cells() - 1) == UVec3::ZERO {
-                        self.mark_brick(occupancy, cell, slot, reach.n_cells());
-                    }
-                }
+        // Bricks of level 0 that are whole cells a side lie in slabs of cells of their own.
+        let n_cells = self.lattice.n_macrocells >> self.lattice.shift;
+        let is_fine = |entry: IndexEntry| n_cells > 0 && entry.reach() == Reach(0);
+        for cell in
+            (0..dims.z).flat_map(|z| (0..dims.y).flat_map(move |y| (0..dims.x).map(move |x| UVec3::new(x, y, z))))
+        {
+            let entry @ IndexEntry::Resident { slot, reach } = index.at(cell) else { continue };
+            // A coarse brick is marked once, from its lower corner.
+            if !is_fine(entry) && cell & (reach.n_cells() - 1) == UVec3::ZERO {
+                self.mark_brick(occupancy, cell, slot, reach.n_cells());
             }
         }
+        if n_cells == 0 {
+            return;
+        }
+        let (lattice, row) = (self.lattice, self.n_cells.x as usize);
+        let slab = row * (self.n_cells.y * n_cells) as usize;
+        self.distances.par_chunks_mut(slab).enumerate().for_each(|(z, cells)| {
+            for (x, y) in (0..dims.y).flat_map(|y| (0..dims.x).map(move |x| (x, y))) {
+                match index.at(UVec3::new(x, y, z as u32)) {
+                    IndexEntry::Resident { slot, reach: Reach(0) } => {
+                        let corner = (x * n_cells) as usize + row * (y * n_cells) as usize;
+                        let seen = occupancy.map(|occupancy| occupancy.brick(slot));
+                        lattice.mark_fine(&mut cells[corner..], [row, row * self.n_cells.y as usize], seen);
+                    }
+                    _ => continue,
+                }
+            }
+        });
     }
 
     fn mark_brick(&mut self, occupancy: Option<&Occupancy>, cell: UVec3, slot: u32, stride: u32) {
@@ -151,4 +188,43 @@ impl Overview {
 
 fn edges(lattice: &Lattice, n: u32) -> Vec<f32> {
     (0..=n).map(|cell| lattice.edge(cell) as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::IndexLattice;
+    use std::sync::Arc;
+
+    #[test]
+    fn bricks_of_level_0_are_marked_as_all_others_are() {
+        let dims = UVec3::new(5, 3, 4);
+        let n = dims.element_product();
+        let cell = |i: u32| UVec3::new(i % dims.x, i / dims.x % dims.y, i / dims.x / dims.y);
+        let entries =
+            (0..n).filter(|i| i % 5 != 2).map(|i| (cell(i), IndexEntry::Resident { slot: i, reach: Reach(0) }));
+        let lattice = IndexLattice { cell_samples: 15, origin: 0.0 };
+        let index = IndexGrid::new(dims, lattice, entries);
+        let visible = |slot: u32| (0..512).map(|m| (m * 7 + slot * 13) % 97 < slot % 5).collect::<Vec<_>>();
+        let distances =
+            (0..n).map(|slot| Some(Arc::new(Occupancy::of_brick(BrickSide::S16, &visible(slot))))).collect();
+        let occupancy = Occupancy::new(BrickSide::S16, distances).unwrap();
+        for occupancy in [None, Some(&*occupancy)] {
+            for shift in 0..=3 {
+                let lattice = Lattice { n_brick: 15, n_macrocells: 8, shift };
+                let n_cells = (dims * 8) >> shift;
+                let edges = n_cells.to_array().map(|n| edges(&lattice, n));
+                let distances = vec![FARTHEST; n_cells.element_product() as usize];
+                let mut fine = Overview { n_cells, distances, edges, lattice };
+                let mut general = fine.clone();
+                fine.mark(&index, occupancy);
+                for i in 0..n {
+                    if let IndexEntry::Resident { slot, .. } = index.at(cell(i)) {
+                        general.mark_brick(occupancy, cell(i), slot, 1);
+                    }
+                }
+                assert!(fine.distances.contains(&0) && fine.distances == general.distances, "{shift}");
+            }
+        }
+    }
 }
