@@ -13,6 +13,7 @@ mod variants;
 mod vulkan;
 
 pub use backend::AshBackend;
+pub use brickfield_frame::AdapterKind;
 pub use error::ConnectError;
-pub use options::{AdapterChoice, AdapterKind, AdapterSummary, Options, Validation, adapters};
+pub use options::{AdapterChoice, AdapterSummary, Options, Validation, adapters};
 pub use vulkan::ValidationLog;

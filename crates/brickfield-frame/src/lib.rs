@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod adapter;
 mod backend;
 mod beams;
 mod brick_set;
@@ -19,6 +20,7 @@ mod surfaces;
 mod uniform;
 mod value_scale;
 
+pub use adapter::AdapterKind;
 pub use backend::{Backend, Capabilities, Description, Frame, RenderError, ShaderFunction, Timing, check_memory};
 pub use beams::{Beams, Overview};
 pub use brick_set::{AtlasShape, BrickSet, BrickSetError, Decode, SampleFormat};

@@ -13,3 +13,4 @@ mod scene;
 
 pub use adapter::{AdapterChoice, AdapterSummary, OpenError, adapters};
 pub use backend::WgpuBackend;
+pub use brickfield_frame::AdapterKind;
