@@ -7,6 +7,7 @@ mod evaluate;
 mod march;
 mod options;
 mod polygons;
+mod probe;
 mod scene;
 mod staging;
 mod variants;

@@ -6,7 +6,7 @@ use wesl::{CompileOptions, Features, ManglerKind, ModulePath, VirtualResolver, W
 
 use crate::{ShaderError, Variant};
 
-const EMBEDDED: [(&str, &str); 11] = [
+const EMBEDDED: [(&str, &str); 12] = [
     ("frame", include_str!("wesl/frame.wesl")),
     ("scalar", include_str!("wesl/scalar.wesl")),
     ("transfer", include_str!("wesl/transfer.wesl")),
@@ -18,6 +18,7 @@ const EMBEDDED: [(&str, &str); 11] = [
     ("march", include_str!("wesl/march.wesl")),
     ("proxy", include_str!("wesl/proxy.wesl")),
     ("evaluate", include_str!("wesl/evaluate.wesl")),
+    ("probe", include_str!("wesl/probe.wesl")),
 ];
 
 /// The shader sources: modules of WESL text by name.

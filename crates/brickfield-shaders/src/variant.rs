@@ -1,6 +1,8 @@
 //! Which shader a plan needs.
 
-use brickfield_frame::{Division, Feature, FeatureSet, FramePlan, Lengths, Placement, QuadratureRule, ShaderFunction};
+use brickfield_frame::{
+    Division, Feature, FeatureSet, Fetch, FramePlan, Lengths, Placement, QuadratureRule, ShaderFunction,
+};
 
 use crate::passes::has_long_rays;
 
@@ -144,12 +146,15 @@ pub enum Entry {
     Proxy,
     /// Evaluates one function on a list of inputs.
     Evaluate(ShaderFunction),
+    /// Reads textures and does nothing else, to be timed ([`brickfield_frame::Probe`]).
+    Probe(Fetch),
 }
 
 impl Entry {
-    /// All kinds of entries, the last for each function.
+    /// All kinds of entries, the last two for each function and each fetch.
     pub fn all() -> impl Iterator<Item = Entry> {
-        [Entry::March, Entry::Proxy].into_iter().chain(ShaderFunction::ALL.into_iter().map(Entry::Evaluate))
+        let functions = ShaderFunction::ALL.into_iter().map(Entry::Evaluate);
+        [Entry::March, Entry::Proxy].into_iter().chain(functions).chain(Fetch::ALL.map(Entry::Probe))
     }
 
     /// The names of the entry points: one for compute, or one for vertices and one for fragments.
@@ -158,6 +163,8 @@ impl Entry {
             Entry::March => &["march"],
             Entry::Proxy => &["project", "shade"],
             Entry::Evaluate(_) => &["evaluate"],
+            Entry::Probe(Fetch::Filtered) => &["filtered"],
+            Entry::Probe(Fetch::Loaded) => &["loaded"],
         }
     }
 
@@ -167,6 +174,7 @@ impl Entry {
             Entry::March => "march",
             Entry::Proxy => "proxy",
             Entry::Evaluate(_) => "evaluate",
+            Entry::Probe(_) => "probe",
         }
     }
 }
@@ -182,6 +190,19 @@ impl Variant {
             long_rays: entry == Entry::March && has_long_rays(plan),
             integer_samples: plan.reads_integers(),
             entry,
+        }
+    }
+
+    /// The shader that reads textures one way. It has nothing of a plan's.
+    pub fn probe(fetch: Fetch) -> Variant {
+        Variant {
+            features: FeatureSet::default(),
+            rule: QuadratureRule::MidpointExponential,
+            segments: Segments::default(),
+            search: KnotSearch::Unrolled(0),
+            long_rays: false,
+            integer_samples: false,
+            entry: Entry::Probe(fetch),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::mem::{offset_of, size_of};
 
-use brickfield_frame::{FeatureSet, FrameUniforms, KnotUniform, QuadratureRule};
+use brickfield_frame::{FeatureSet, Fetch, FrameUniforms, KnotUniform, ProbeUniforms, QuadratureRule};
 use brickfield_shaders::naga::{Module, TypeInner};
 use brickfield_shaders::{Entry, KnotSearch, Segments, Variant, specialise};
 
@@ -40,4 +40,7 @@ fn host_and_shader_structs_have_the_same_layout() {
         direction_down, domain_min, domain_max, visible_min, visible_max, origin, last_sample, index_dims, atlas_bricks, size,
         planes_low, planes_high, voxel_world));
     assert_equal(&module, "Knot", host!(KnotUniform, optics, value));
+    for fetch in Fetch::ALL {
+        assert_equal(&specialise(&Variant::probe(fetch)).unwrap().module, "Probe", host!(ProbeUniforms, work));
+    }
 }

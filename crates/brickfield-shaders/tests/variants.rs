@@ -1,6 +1,6 @@
 //! Every variant compiles, and holds nothing that it does not need.
 
-use brickfield_frame::{Division, Feature, FeatureSet, Lengths, QuadratureRule, ShaderFunction};
+use brickfield_frame::{Division, Feature, FeatureSet, Fetch, Lengths, QuadratureRule, ShaderFunction};
 use brickfield_shaders::{BindingKind, Entry, KnotSearch, Segments, Specialised, Surfaces, Variant, specialise};
 
 const SEARCH: KnotSearch = KnotSearch::Unrolled(2);
@@ -161,4 +161,15 @@ fn functions_bind_what_they_read() {
     assert_eq!(bindings(ShaderFunction::Classify), [0, 4, 6, 7]);
     assert_eq!(bindings(ShaderFunction::Sample), [0, 1, 3, 6, 7]);
     assert_eq!(bindings(ShaderFunction::RayAnchor), [0, 6, 7]);
+}
+
+#[test]
+fn a_probe_reads_one_way_and_binds_no_more() {
+    let filtered = compile(&Variant::probe(Fetch::Filtered));
+    assert_eq!((indices(&filtered), filtered.workgroup_size), (vec![0, 1, 2, 7], [8, 8, 1]));
+    assert!(!filtered.wgsl.contains("textureLoad"));
+    let loaded = compile(&Variant::probe(Fetch::Loaded));
+    assert_eq!((indices(&loaded), loaded.workgroup_size), (vec![0, 1, 7], [8, 8, 1]));
+    assert!(!loaded.wgsl.contains("textureSample"));
+    assert!([filtered, loaded].iter().all(|shader| shader.spirv().unwrap().len() > 100));
 }

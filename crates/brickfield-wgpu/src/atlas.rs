@@ -94,7 +94,8 @@ fn layer_bytes(bricks: &BrickSet, shape: AtlasShape, layer: u32) -> Vec<u8> {
     bytes
 }
 
-fn format(device: &Device, format: SampleFormat) -> Result<TextureFormat, RenderError> {
+/// A texel's format on a device.
+pub(crate) fn format(device: &Device, format: SampleFormat) -> Result<TextureFormat, RenderError> {
     match format {
         SampleFormat::Unorm8 => Ok(TextureFormat::R8Unorm),
         SampleFormat::Unorm16 if device.has(Features::TEXTURE_FORMAT_16BIT_NORM) => Ok(TextureFormat::R16Unorm),

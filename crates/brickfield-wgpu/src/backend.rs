@@ -25,9 +25,9 @@ use crate::{AdapterChoice, OpenError, adapter};
 /// On the device stay: the atlas of the last plan's bricks (as long as a plan holds the same [`Arc`](std::sync::Arc)), the
 /// pipeline of each shader variant, the picture, and buffers that grow when they must.
 pub struct WgpuBackend {
-    device: Device,
-    pipelines: Pipelines,
-    clock: Option<Clock>,
+    pub(crate) device: Device,
+    pub(crate) pipelines: Pipelines,
+    pub(crate) clock: Option<Clock>,
     scene: Scene,
     polygons: Polygons,
     staging: Reused,

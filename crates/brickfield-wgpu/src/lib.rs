@@ -9,6 +9,7 @@ mod device;
 mod picture;
 mod pipeline;
 mod polygons;
+mod probe;
 mod scene;
 
 pub use adapter::{AdapterChoice, AdapterSummary, OpenError, adapters};
