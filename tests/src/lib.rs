@@ -2,6 +2,7 @@
 //!
 //! Unpublished. `compare` (binary) renders a scene on every backend and reports error against run time; `conformance` holds
 //! every backend to the f64 answer, and its own cases to mutants; `orders` prints observed orders of accuracy; `speed` times.
+//! Whatever is timed is timed by [`turns`].
 
 pub mod compare;
 pub mod conformance;
@@ -9,4 +10,5 @@ pub mod lamar;
 pub mod metrics;
 pub mod orders;
 pub mod report;
+pub mod turns;
 pub mod volumes;

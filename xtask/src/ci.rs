@@ -70,8 +70,9 @@ fn steps() -> Result<Vec<Step>> {
     ];
     steps.extend(readme_steps()?);
     steps.push(step("orders of accuracy", || xtask(&["orders"]).run()));
-    steps.push(step("conformance", || xtask(&["conformance", "--require", "cpu,wgpu,ash"]).run()));
-    steps.push(step("conformance of the cases", || xtask(&["conformance", "--self-check"]).run()));
+    steps.push(step("conformance, of the cases too", || {
+        xtask(&["conformance", "--require", "cpu,wgpu,ash", "--self-check"]).run()
+    }));
     let of_lamar = ["compare", "--paper", "lamar", "--check=pictures", "--require", "wgpu,ash"];
     let claims = [&of_lamar[..], &["--part", "selection,seams,shells"]].concat();
     steps.push(step("claims of LaMar, Hamann and Joy 1999", move || xtask(&claims).run()));

@@ -1,6 +1,7 @@
 //! The WESL sources, and how a text is made of them.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use wesl::{CompileOptions, Features, ManglerKind, ModulePath, VirtualResolver, Wesl};
 
@@ -39,6 +40,8 @@ pub enum PatchError {
     NoModule { module: String, modules: String },
     #[error("`{from}` occurs {n} times in shader module `{module}`; it must occur once")]
     NotOnce { module: String, from: String, n: usize },
+    #[error("shader module `{module}` declares no function or constant `{name}`")]
+    NoDeclaration { module: String, name: String },
 }
 
 impl Default for ShaderLibrary {
@@ -58,11 +61,24 @@ impl ShaderLibrary {
         self.modules.iter().map(|(name, text)| (*name, text.as_ref()))
     }
 
-    /// The library with `from` replaced by `to` in one module.
+    /// The library with `from` replaced by `to` in one module. Texts are compared token by token: neither comments nor white
+    /// space matter.
     ///
     /// # Errors
     /// If there is no such module, or if `from` does not occur exactly once in it.
     pub fn patched(&self, module: &str, from: &str, to: &str) -> Result<ShaderLibrary, PatchError> {
+        self.patch(module, None, from, to)
+    }
+
+    /// As [`patched`](Self::patched), within the functions or constants of one name (conditions may choose among several).
+    ///
+    /// # Errors
+    /// As [`patched`](Self::patched); or if the module declares nothing of this name.
+    pub fn patched_in(&self, module: &str, name: &str, from: &str, to: &str) -> Result<ShaderLibrary, PatchError> {
+        self.patch(module, Some(name), from, to)
+    }
+
+    fn patch(&self, module: &str, name: Option<&str>, from: &str, to: &str) -> Result<ShaderLibrary, PatchError> {
         let mut library = self.clone();
         let names = || self.modules().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
         let (_, text) = library
@@ -70,11 +86,20 @@ impl ShaderLibrary {
             .iter_mut()
             .find(|(name, _)| *name == module)
             .ok_or_else(|| PatchError::NoModule { module: module.to_owned(), modules: names() })?;
-        let n = text.matches(from).count();
-        if n != 1 {
-            return Err(PatchError::NotOnce { module: module.to_owned(), from: from.to_owned(), n });
+        let tokens = tokens(text);
+        let scopes = match name {
+            Some(name) => declarations(text, &tokens, name),
+            None => std::iter::once(0..tokens.len()).collect(),
+        };
+        if scopes.is_empty() {
+            let name = name.unwrap_or_default().to_owned();
+            return Err(PatchError::NoDeclaration { module: module.to_owned(), name });
         }
-        *text = Cow::Owned(text.replace(from, to));
+        let hits: Vec<_> = scopes.into_iter().flat_map(|scope| find(text, &tokens[scope], from)).collect();
+        let [hit] = hits.as_slice() else {
+            return Err(PatchError::NotOnce { module: module.to_owned(), from: from.to_owned(), n: hits.len() });
+        };
+        text.to_mut().replace_range(hit.clone(), to);
         Ok(library)
     }
 
@@ -89,6 +114,52 @@ impl ShaderLibrary {
         let compiled = compiler.compile(&path(variant.entry.module())?).map_err(ShaderError::compile)?;
         Ok(compiled.to_string())
     }
+}
+
+/// Where the tokens of a text lie: words and numbers, and everything else one by one, without comments and white space.
+fn tokens(text: &str) -> Vec<Range<usize>> {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let (mut tokens, mut at) = (Vec::new(), 0);
+    while let Some(first) = text[at..].chars().next() {
+        let rest = &text[at..];
+        let n_bytes = match first {
+            '/' if rest.starts_with("//") => rest.find('\n').unwrap_or(rest.len()),
+            c if is_word(c) => rest.find(|c| !is_word(c)).unwrap_or(rest.len()),
+            c => c.len_utf8(),
+        };
+        if !first.is_whitespace() && !rest.starts_with("//") {
+            tokens.push(at..at + n_bytes);
+        }
+        at += n_bytes;
+    }
+    tokens
+}
+
+/// The tokens of all functions and constants of a name: from `fn` or `const` to the closing brace or the semicolon.
+fn declarations(text: &str, tokens: &[Range<usize>], name: &str) -> Vec<Range<usize>> {
+    let word = |i: usize| tokens.get(i).map_or("", |token| &text[token.clone()]);
+    let end = |start: usize| {
+        let mut depth = 0;
+        let closes = |i: &usize| {
+            depth += match word(*i) {
+                "{" => 1,
+                "}" => -1,
+                _ => 0,
+            };
+            depth == 0 && matches!(word(*i), "}" | ";")
+        };
+        (start..tokens.len()).find(closes).map_or(tokens.len(), |last| last + 1)
+    };
+    let starts = (0..tokens.len()).filter(|i| matches!(word(*i), "fn" | "const") && word(i + 1) == name);
+    starts.map(|start| start..end(start)).collect()
+}
+
+/// The bytes of each place where the tokens of `pattern` stand in a row.
+fn find(text: &str, tokens: &[Range<usize>], pattern: &str) -> Vec<Range<usize>> {
+    let pattern: Vec<&str> = self::tokens(pattern).into_iter().map(|token| &pattern[token]).collect();
+    let is_hit = |window: &&[Range<usize>]| window.iter().map(|token| &text[token.clone()]).eq(pattern.iter().copied());
+    let hits = tokens.windows(pattern.len().max(1)).filter(is_hit);
+    hits.map(|window| window[0].start..window[window.len() - 1].end).collect()
 }
 
 fn path(module: &str) -> Result<ModulePath, ShaderError> {
@@ -120,5 +191,18 @@ mod tests {
         assert!(matches!(library.patched("scalar", "return", ""), Err(PatchError::NotOnce { n: 3, .. })));
         assert!(matches!(library.patched("scalar", "no such text", ""), Err(PatchError::NotOnce { n: 0, .. })));
         assert!(library.patched("nothing", "", "").unwrap_err().to_string().contains("march"));
+    }
+
+    #[test]
+    fn patches_ignore_comments_and_white_space_and_keep_to_a_declaration() {
+        let text = "const A = 1; // two\nfn f() {\n    // a\n    if b { return x; }\n    return  x ; // y\n}\n\nfn g() { return x; }\n";
+        let library = ShaderLibrary { modules: vec![("m", text.into())] };
+        let patched = |name, from| library.patched_in("m", name, from, "0").map(|l| l.modules[0].1.to_string());
+        assert_eq!(patched("A", "1").unwrap(), text.replace("A = 1", "A = 0"));
+        assert_eq!(patched("g", "return\nx").unwrap(), text.replace("g() { return x", "g() { 0"));
+        assert_eq!(patched("f", "} return x;").unwrap(), text.replace("}\n    return  x ;", "0"));
+        assert!(matches!(patched("f", "x"), Err(PatchError::NotOnce { n: 2, .. })));
+        assert!(matches!(patched("f", "eturn x"), Err(PatchError::NotOnce { n: 0, .. })));
+        assert!(matches!(patched("h", "x"), Err(PatchError::NoDeclaration { .. })));
     }
 }

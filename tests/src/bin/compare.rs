@@ -31,7 +31,7 @@ fn of_paper() -> ExitCode {
             for missed in &findings.missed {
                 eprintln!("compare: missed: {}", missed.what);
             }
-            let fails = findings.missed.iter().any(|missed| args.check.contains(&missed.claim));
+            let fails = findings.missed.iter().any(|missed| args.check.contains(&missed.kind));
             ExitCode::from(if fails { 4 } else { 0 })
         }
         Err(e) => {

@@ -1,4 +1,4 @@
-//! The measuring itself: contestants take turns, so that what else the machine does hits them alike.
+//! The measuring itself: contestants take turns, so that other load on the machine hits all of them alike.
 
 use std::time::{Duration, Instant};
 
@@ -9,9 +9,10 @@ use indicatif::ProgressBar;
 use super::CompareError;
 use super::output::{OutputError, Pictures, Shown};
 use super::rivals::Rivals;
-use super::sweep::{Case, Priority, REACHED};
+use super::sweep::{Priority, REACHED, SweepPoint};
 use crate::metrics::median;
 use crate::report::{LeftOut, Row};
+use crate::turns::{Spread, order};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug)]
@@ -23,15 +24,15 @@ pub(super) struct Limits {
 }
 
 pub(super) struct Contest<'a> {
-    pub(super) cases: &'a [Case],
+    pub(super) points: &'a [SweepPoint],
     pub(super) rivals: &'a mut Rivals,
     pub(super) pictures: &'a Pictures<'a>,
     pub(super) limits: Limits,
 }
 
-/// One backend at one case: its first frame has been drawn and judged.
+/// One backend at one point: its first frame has been drawn and judged.
 struct Entry {
-    case: usize,
+    point: usize,
     rival: usize,
     shown: Shown,
     warm_up: Timing,
@@ -44,10 +45,10 @@ impl Contest<'_> {
     /// A first frame of everybody, which warms up and gives the picture; then timed rounds, until frames or time run out.
     pub(super) fn run(mut self) -> Result<(Vec<Row>, Vec<LeftOut>), CompareError> {
         let bar = progress_bar("measuring");
-        bar.set_length((self.cases.len() * self.rivals.present.len()) as u64 * u64::from(1 + self.limits.n_frames));
+        bar.set_length((self.points.len() * self.rivals.present.len()) as u64 * u64::from(1 + self.limits.n_frames));
         let (mut entries, mut left_out) = self.first_round(&bar)?;
-        for _ in 0..self.limits.n_frames {
-            self.round(&mut entries, &mut left_out, &bar);
+        for round in 1..=self.limits.n_frames {
+            self.round(round, &mut entries, &mut left_out, &bar);
         }
         bar.finish_and_clear();
         Ok((entries.into_iter().map(|e| self.row(e)).collect(), left_out))
@@ -58,25 +59,25 @@ impl Contest<'_> {
         // Half the time is for first frames, so that the other half is for timed ones; what leads may take more.
         let begin = Instant::now();
         let half = begin + self.limits.end.saturating_duration_since(begin) / 2;
-        for case in 0..self.cases.len() {
+        for point in 0..self.points.len() {
             for rival in 0..self.rivals.present.len() {
                 bar.inc(1);
-                if self.is_reached(&entries, case, rival) {
+                if self.is_reached(&entries, point, rival) {
                     continue;
                 }
-                let end = if self.cases[case].priority == Priority::Normal { half } else { self.limits.end };
-                let expected = self.expected(&entries, case, rival);
-                if Instant::now() + expected > end && case > 0 {
+                let end = if self.points[point].priority == Priority::Normal { half } else { self.limits.end };
+                let expected = self.expected(&entries, point, rival);
+                if Instant::now() + expected > end && point > 0 {
                     let reason = match expected {
                         Duration::ZERO => "no time was left for it: allow more --seconds".to_owned(),
                         _ => format!("it would take {:.1} s a frame: allow more --seconds", expected.as_secs_f64()),
                     };
-                    left_out.push(self.left_out(case, rival, reason));
+                    left_out.push(self.left_out(point, rival, reason));
                     continue;
                 }
-                match self.first_frame(case, rival)? {
+                match self.first_frame(point, rival)? {
                     Ok(entry) => entries.push(entry),
-                    Err(reason) => left_out.push(self.left_out(case, rival, reason)),
+                    Err(reason) => left_out.push(self.left_out(point, rival, reason)),
                 }
             }
         }
@@ -84,24 +85,24 @@ impl Contest<'_> {
     }
 
     /// Whether a smaller step is not needed any more: the pursued curve's error is below [`REACHED`].
-    fn is_reached(&self, entries: &[Entry], case: usize, rival: usize) -> bool {
-        let c = &self.cases[case];
-        let reached = |e: &Entry| e.shown.errors.rmse < REACHED && like(&self.cases[e.case], c) && e.rival == rival;
+    fn is_reached(&self, entries: &[Entry], point: usize, rival: usize) -> bool {
+        let c = &self.points[point];
+        let reached = |e: &Entry| e.shown.errors.rmse < REACHED && like(&self.points[e.point], c) && e.rival == rival;
         c.priority == Priority::Pursuit && entries.iter().any(reached)
     }
 
     /// How long a first frame should take, by the same backend's last one of that rule and mode.
-    fn expected(&self, entries: &[Entry], case: usize, rival: usize) -> Duration {
-        let c = &self.cases[case];
-        let last = entries.iter().rev().find(|e| e.rival == rival && like(&self.cases[e.case], c));
+    fn expected(&self, entries: &[Entry], point: usize, rival: usize) -> Duration {
+        let c = &self.points[point];
+        let last = entries.iter().rev().find(|e| e.rival == rival && like(&self.points[e.point], c));
         let Some(last) = last else { return Duration::ZERO };
-        let more = c.n_samples as f64 / self.cases[last.case].n_samples.max(1) as f64;
+        let more = c.n_samples as f64 / self.points[last.point].n_samples.max(1) as f64;
         Duration::from_secs_f64((last.warm_up.wall_ms * more.max(0.0)).min(1e9) * 1e-3)
     }
 
     /// The inner error says why this frame could not be had; the outer one ends the comparison.
-    fn first_frame(&mut self, case: usize, rival: usize) -> Result<Result<Entry, String>, OutputError> {
-        let (begin, c) = (Instant::now(), &self.cases[case]);
+    fn first_frame(&mut self, point: usize, rival: usize) -> Result<Result<Entry, String>, OutputError> {
+        let (begin, c) = (Instant::now(), &self.points[point]);
         let backend = &mut self.rivals.present[rival];
         let Frame { image, timing } = match backend.render(&c.plan) {
             Ok(frame) => frame,
@@ -109,31 +110,33 @@ impl Contest<'_> {
         };
         let whole = begin.elapsed();
         let shown = self.pictures.judge(c, backend.describe(), &image)?;
-        Ok(shown.map(|shown| Entry { case, rival, shown, warm_up: timing, timed: Vec::new(), whole }))
+        Ok(shown.map(|shown| Entry { point, rival, shown, warm_up: timing, timed: Vec::new(), whole }))
     }
 
-    fn round(&mut self, entries: &mut Vec<Entry>, left_out: &mut Vec<LeftOut>, bar: &ProgressBar) {
+    fn round(&mut self, round: u32, entries: &mut Vec<Entry>, left_out: &mut Vec<LeftOut>, bar: &ProgressBar) {
         let mut failed = Vec::new();
-        for (i, entry) in entries.iter_mut().enumerate() {
+        for i in order(round, entries.len()) {
+            let entry = &mut entries[i];
             bar.inc(1);
             if Instant::now() + entry.whole > self.limits.end {
                 continue;
             }
             let begin = Instant::now();
-            match self.rivals.present[entry.rival].render(&self.cases[entry.case].plan) {
+            match self.rivals.present[entry.rival].render(&self.points[entry.point].plan) {
                 Ok(frame) => entry.timed.push(frame.timing),
                 Err(e) => failed.push((i, e.to_string())),
             }
             entry.whole = begin.elapsed();
         }
+        failed.sort();
         for (i, reason) in failed.into_iter().rev() {
             let entry = entries.remove(i);
-            left_out.push(self.left_out(entry.case, entry.rival, format!("a later frame failed: {reason}")));
+            left_out.push(self.left_out(entry.point, entry.rival, format!("a later frame failed: {reason}")));
         }
     }
 
-    fn left_out(&self, case: usize, rival: usize, reason: String) -> LeftOut {
-        let c = &self.cases[case];
+    fn left_out(&self, point: usize, rival: usize, reason: String) -> LeftOut {
+        let c = &self.points[point];
         LeftOut {
             backend: self.rivals.present[rival].describe().backend.to_owned(),
             mode: c.mode.name().to_owned(),
@@ -144,9 +147,10 @@ impl Contest<'_> {
     }
 
     fn row(&self, entry: Entry) -> Row {
-        let (c, d) = (&self.cases[entry.case], self.rivals.present[entry.rival].describe());
+        let (c, d) = (&self.points[entry.point], self.rivals.present[entry.rival].describe());
         let timings = if entry.timed.is_empty() { vec![entry.warm_up] } else { entry.timed };
         let wall: Vec<f64> = timings.iter().map(|t| t.wall_ms).collect();
+        let spread = Spread::of(&wall);
         let device: Option<Vec<f64>> = timings.iter().map(|t| t.device_ms).collect();
         let Shown { errors, delta_e, files, difference } = entry.shown;
         Row {
@@ -156,10 +160,10 @@ impl Contest<'_> {
             rule: c.rule.name().to_owned(),
             step_voxels: c.step_voxels,
             samples: c.n_samples,
-            min_ms: wall.iter().copied().fold(f64::INFINITY, f64::min),
-            max_ms: wall.iter().copied().fold(0.0, f64::max),
+            min_ms: spread.min,
+            max_ms: spread.max,
             n_frames: wall.len() as u32,
-            median_ms: median(wall),
+            median_ms: spread.median,
             device_ms: device.map(median),
             upload_ms: entry.warm_up.upload_ms,
             rmse: errors.rmse,
@@ -177,7 +181,7 @@ impl Contest<'_> {
     }
 }
 
-/// Whether two cases lie on one curve.
-fn like(a: &Case, b: &Case) -> bool {
+/// Whether two points lie on one curve.
+fn like(a: &SweepPoint, b: &SweepPoint) -> bool {
     a.rule == b.rule && a.mode == b.mode
 }

@@ -68,11 +68,11 @@ pub fn compare(args: &CompareArgs) -> Result<Report, CompareError> {
     rivals.check_required(&args.require)?;
     rivals.check_any()?;
     let exhibit = subject::exhibit(args)?;
-    let cases = sweep::cases(args, &exhibit)?;
+    let points = sweep::sweep_points(args, &exhibit)?;
     let (answer, reference) = answer(args, &exhibit, &output)?;
     let pictures = Pictures { output: &output, answer: &answer, background: args.view.background.0 };
     let limits = Limits { end: begin + time_allowed(args), n_frames: args.frames };
-    let (rows, left_out) = Contest { cases: &cases, rivals: &mut rivals, pictures: &pictures, limits }.run()?;
+    let (rows, left_out) = Contest { points: &points, rivals: &mut rivals, pictures: &pictures, limits }.run()?;
     if let (true, Some(first)) = (rows.is_empty(), left_out.first()) {
         return Err(CompareError::Nothing { reason: first.reason.clone() });
     }

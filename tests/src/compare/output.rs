@@ -8,7 +8,7 @@ use brickfield::frame::Description;
 use brickfield::optics::ColorDifferences;
 use brickfield::{PictureError, write_exr, write_png};
 
-use super::sweep::Case;
+use super::sweep::SweepPoint;
 use crate::metrics::{Errors, delta_e, errors};
 use crate::report::{Report, heat};
 
@@ -112,7 +112,7 @@ impl Pictures<'_> {
     /// The inner error says why the picture has no errors (it is not finite, say).
     pub(super) fn judge(
         &self,
-        case: &Case,
+        case: &SweepPoint,
         by: &Description,
         image: &Image<f32>,
     ) -> Result<Result<Shown, String>, OutputError> {

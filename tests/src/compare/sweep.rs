@@ -23,7 +23,7 @@ const PURSUIT: &[f64] = &[0.03125, 0.015625, 0.0078125];
 pub(super) const REACHED: f64 = 1e-5;
 
 /// One point of the sweep, the same for all backends.
-pub(super) struct Case {
+pub(super) struct SweepPoint {
     pub(super) mode: Mode,
     pub(super) rule: QuadratureRule,
     pub(super) step_voxels: f64,
@@ -43,18 +43,18 @@ pub(super) enum Priority {
     Normal,
 }
 
-/// All cases, by priority, then from the largest step to the smallest.
-pub(super) fn cases(args: &CompareArgs, exhibit: &Exhibit) -> Result<Vec<Case>, CompareError> {
+/// All points, by priority, then from the largest step to the smallest.
+pub(super) fn sweep_points(args: &CompareArgs, exhibit: &Exhibit) -> Result<Vec<SweepPoint>, CompareError> {
     // Rules differ in the bricks that they need; plans of one rule share theirs.
     let mut residencies: HashMap<QuadratureRule, Residency> = HashMap::new();
-    let mut cases = Vec::new();
+    let mut all = Vec::new();
     for (mode, rule, step_voxels, priority) in points(args) {
         let scene = Scene { step_voxels, rule, mode, ..exhibit.scene.clone() };
         let plan = prepare(&exhibit.subject.tree, &scene, residencies.entry(rule).or_default())?;
-        cases.push(Case { mode, rule, step_voxels, priority, n_samples: count_samples(&plan), plan });
+        all.push(SweepPoint { mode, rule, step_voxels, priority, n_samples: count_samples(&plan), plan });
     }
-    cases.sort_by(|a, b| (a.priority, b.step_voxels).partial_cmp(&(b.priority, a.step_voxels)).unwrap_or(Equal));
-    Ok(cases)
+    all.sort_by(|a, b| (a.priority, b.step_voxels).partial_cmp(&(b.priority, a.step_voxels)).unwrap_or(Equal));
+    Ok(all)
 }
 
 /// The points of the sweep: those that are asked for, or those that are worth it.
@@ -113,12 +113,12 @@ mod tests {
     #[test]
     fn samples_are_the_discrete_references_count() {
         let args = args("--size 24x16 --steps 1,0.3 --rules gauss2,midpoint --modes exact");
-        for case in cases(&args, &exhibit(&args).unwrap()).unwrap() {
-            let counted = discrete(&case.plan).n_samples;
+        for point in sweep_points(&args, &exhibit(&args).unwrap()).unwrap() {
+            let counted = discrete(&point.plan).n_samples;
             assert!(
-                case.n_samples.abs_diff(counted) * 1000 <= counted && counted > 1000,
+                point.n_samples.abs_diff(counted) * 1000 <= counted && counted > 1000,
                 "{counted} {}",
-                case.n_samples
+                point.n_samples
             );
         }
     }
@@ -126,20 +126,21 @@ mod tests {
     #[test]
     fn the_default_sweep_has_the_leading_curve_first_runs_to_small_steps_and_shares_bricks() {
         let args = args("--size 8x8");
-        let cases = cases(&args, &exhibit(&args).unwrap()).unwrap();
-        assert_eq!(cases.len(), 5 * 4 + 2 * 5 + 3 * 6 + 3);
-        assert!(cases.windows(2).all(|c| c[0].priority < c[1].priority || c[0].step_voxels >= c[1].step_voxels));
-        let first = |c: &&Case| c.priority == Priority::First;
-        assert!(cases.iter().take_while(first).all(|c| c.rule == QuadratureRule::Gauss2 && c.mode == Mode::Exact));
-        assert_eq!(cases.iter().filter(first).count(), HIGH_ORDER.len());
-        let sets: std::collections::HashSet<_> = cases.iter().map(|c| std::sync::Arc::as_ptr(&c.plan.bricks)).collect();
+        let points = sweep_points(&args, &exhibit(&args).unwrap()).unwrap();
+        assert_eq!(points.len(), 5 * 4 + 2 * 5 + 3 * 6 + 3);
+        assert!(points.windows(2).all(|c| c[0].priority < c[1].priority || c[0].step_voxels >= c[1].step_voxels));
+        let first = |c: &&SweepPoint| c.priority == Priority::First;
+        assert!(points.iter().take_while(first).all(|c| c.rule == QuadratureRule::Gauss2 && c.mode == Mode::Exact));
+        assert_eq!(points.iter().filter(first).count(), HIGH_ORDER.len());
+        let sets: std::collections::HashSet<_> =
+            points.iter().map(|c| std::sync::Arc::as_ptr(&c.plan.bricks)).collect();
         assert_eq!(sets.len(), 5);
     }
 
     #[test]
     fn steps_that_are_asked_for_are_taken_once_by_every_rule_and_mode() {
         let args = args("--size 8x8 --steps 1/64,4,4 --rules gauss2,left-riemann");
-        let cases = cases(&args, &exhibit(&args).unwrap()).unwrap();
-        assert_eq!(cases.len(), 2 * 2 * 2);
+        let points = sweep_points(&args, &exhibit(&args).unwrap()).unwrap();
+        assert_eq!(points.len(), 2 * 2 * 2);
     }
 }

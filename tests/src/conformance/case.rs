@@ -1,4 +1,4 @@
-//! A case: something to render or evaluate, what holds it to account, and the mutants that it must catch.
+//! A case: a scene to render or a function to evaluate, its reference, and the mutants that it must catch.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -14,20 +14,20 @@ use super::shader_mutants::ShaderMutant;
 
 /// A case of the conformance run.
 pub struct Case {
-    /// Its name: group/what.
+    /// Its name: group/name.
     pub name: String,
-    /// What is done.
+    /// The picture or the function.
     pub check: Check,
     /// The mutants that the case must catch; at least one.
     pub mutants: Vec<Mutant>,
 }
 
-/// What a case does.
+/// The test of a case.
 pub enum Check {
     /// Renders a scene.
-    Picture(Box<dyn Fn() -> Result<Subject, NoData>>),
+    Picture(Box<dyn Fn() -> Result<PictureTest, NoData> + Send + Sync>),
     /// Evaluates one function on a list of inputs.
-    Function(Box<dyn Fn() -> FunctionTest>),
+    Function(Box<dyn Fn() -> FunctionTest + Send + Sync>),
 }
 
 /// A backend with one thing wrong.
@@ -47,8 +47,8 @@ pub struct NoData {
     pub reason: String,
 }
 
-/// What a picture case renders.
-pub struct Subject {
+/// The scene of a picture case.
+pub struct PictureTest {
     /// The volume's octree.
     pub tree: BrickTree,
     /// How it is shown.
@@ -95,7 +95,7 @@ pub struct FunctionTest {
     pub plan: FramePlan,
     /// The function.
     pub function: ShaderFunction,
-    /// Inputs, each with what must come out.
+    /// Inputs, each with its answer.
     pub points: Vec<Point>,
 }
 
@@ -108,19 +108,19 @@ pub struct Point {
     pub tolerance: [f64; 4],
 }
 
-/// A picture case's plans: what backends replay, and what they are held to.
+/// The plans of a picture case: one that backends replay, and one of which the reference is made.
 pub struct Plans {
-    /// What backends replay.
+    /// The plan that backends replay.
     pub replayed: FramePlan,
-    /// The same frame without skipping, by casting rays: what the replayed one must look like.
+    /// The same frame without skipping, by casting rays: its f64 sum is the reference.
     pub complete: FramePlan,
 }
 
-impl Subject {
+impl PictureTest {
     /// Prepares the scene as it is, and without skipping.
     ///
     /// # Errors
-    /// What `prepare` refuses.
+    /// A scene that `prepare` refuses.
     pub fn plans(&self) -> Result<Plans, PrepareError> {
         let technique = Technique::RayCasting;
         let complete = Scene { skipping: Skipping::Off, technique, ..self.scene.clone() };

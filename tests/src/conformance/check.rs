@@ -1,16 +1,19 @@
-//! Runs one case: makes what is asked, and judges what comes back.
+//! Runs one case: prepares its plans and its reference, runs them on a backend, and judges the picture or the values.
 
 use std::any::Any;
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use brickfield::cpu::{Discrete, discrete};
-use brickfield::frame::{Capabilities, RenderError};
+use brickfield::frame::{Capabilities, Mode, RenderError};
 use brickfield_core::Image;
+use brickfield_core::glam::UVec2;
 
-use super::case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, Plans, Shows, Subject};
-use super::contestant::Contestant;
+use super::candidate::Candidate;
+use super::case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, PictureTest, Plans, Shows};
 use super::naive::naive;
-use super::rule::{Complaint, Tolerance, Verdict, bounded};
+use super::record::RecordEntry;
+use super::rule::{Complaint, PlanTolerance, Tolerance, Verdict, bounded};
 
 /// A case that is ready to be run on any backend.
 pub struct Prepared {
@@ -18,8 +21,18 @@ pub struct Prepared {
 }
 
 enum Work {
-    Picture { subject: Box<Subject>, plans: Box<Plans>, reference: Discrete },
+    Picture(Box<PreparedPicture>),
     Function(Box<FunctionTest>),
+}
+
+/// A picture case's plans, its reference, and how far a picture may be from it.
+struct PreparedPicture {
+    subject: PictureTest,
+    plans: Plans,
+    reference: Discrete,
+    tolerance: Result<PlanTolerance, Complaint>,
+    /// By [`PreparedPicture::device_key`], as backends ask for them.
+    on_devices: BTreeMap<Option<u32>, Tolerance>,
 }
 
 /// Why a case could not be prepared.
@@ -34,7 +47,7 @@ pub enum Obstacle {
     Wrong(#[from] Complaint),
 }
 
-/// What came of a case on a backend.
+/// The result of a case on a backend.
 pub enum Judged {
     /// The backend is absent.
     Absent,
@@ -44,10 +57,24 @@ pub enum Judged {
     Broken(RenderError),
     /// The backend panicked.
     Panicked(String),
-    /// A picture, and what the rules say.
+    /// A picture, and the verdict of the rules.
     Picture(Image<f32>, Verdict),
-    /// What a function returned was held against its equation: greatest difference in units of its tolerance.
-    Function(Result<f64, String>),
+    /// A function's outputs, held against its equation: greatest difference in units of its tolerance.
+    Function(Vec<[f32; 4]>, Result<f64, String>),
+}
+
+impl Judged {
+    /// The backend's answer, as an entry of a record: a picture, or a function's outputs as a picture of one row.
+    pub fn answer(&self, case: &str, backend: &str) -> Option<RecordEntry> {
+        let (size, values) = match self {
+            Judged::Picture(image, _) => (image.size(), image.pixels()),
+            Judged::Function(outputs, _) => (UVec2::new(outputs.len() as u32, 1), outputs.as_slice()),
+            _ => return None,
+        };
+        let answer =
+            || RecordEntry { case: case.to_owned(), backend: backend.to_owned(), size, values: values.to_vec() };
+        (!values.is_empty()).then(answer)
+    }
 }
 
 /// How far the reference may be from the volume's own sum: f64, in another order.
@@ -62,12 +89,14 @@ impl Prepared {
         let work = match &case.check {
             Check::Function(test) => Work::Function(Box::new(test())),
             Check::Picture(subject) => {
-                let subject = Box::new(subject()?);
-                let plans = Box::new(subject.plans()?);
+                let subject = subject()?;
+                let plans = subject.plans()?;
                 let reference = discrete(&plans.complete);
                 check_blank(&subject, &reference)?;
                 check_oracle(&subject, &reference)?;
-                Work::Picture { subject, plans, reference }
+                let tolerance = PlanTolerance::of(&plans.replayed, &reference);
+                let on_devices = BTreeMap::new();
+                Work::Picture(Box::new(PreparedPicture { subject, plans, reference, tolerance, on_devices }))
             }
         };
         Ok(Prepared { work })
@@ -76,18 +105,18 @@ impl Prepared {
     /// The reference picture, if the case has one.
     pub fn reference(&self) -> Option<&Image<f64>> {
         match &self.work {
-            Work::Picture { reference, .. } => Some(&reference.image),
+            Work::Picture(picture) => Some(&picture.reference.image),
             Work::Function(_) => None,
         }
     }
 
     /// Runs the case on a backend; with a mutant, on the plan that the mutant makes of it. (Shader mutants are in the
     /// backend.)
-    pub fn run(&self, on: &mut Contestant, mutant: Option<&Mutant>) -> Judged {
+    pub fn run(&mut self, on: &mut Candidate, mutant: Option<&Mutant>) -> Judged {
         let Some(capabilities) = on.capabilities() else { return Judged::Absent };
-        let run = AssertUnwindSafe(|| match &self.work {
+        let run = AssertUnwindSafe(|| match &mut self.work {
             Work::Function(test) => run_function(test, on, mutant),
-            Work::Picture { plans, reference, .. } => run_picture(plans, reference, &capabilities, on, mutant),
+            Work::Picture(picture) => run_picture(picture, &capabilities, on, mutant),
         });
         // A backend that panics fails its case, not the run.
         catch_unwind(run).unwrap_or_else(|payload| Judged::Panicked(words(payload.as_ref())))
@@ -96,8 +125,8 @@ impl Prepared {
     /// The scene in a few words.
     pub fn describe(&self) -> String {
         match &self.work {
-            Work::Picture { subject, plans, .. } => {
-                let (scene, plan) = (&subject.scene, &plans.replayed);
+            Work::Picture(picture) => {
+                let (scene, plan) = (&picture.subject.scene, &picture.plans.replayed);
                 let (n, size) = (plan.bricks.n_bricks(), scene.size);
                 format!("{} x {} pixels, {n} bricks, {}, {}", size.x, size.y, scene.rule.name(), scene.mode.name())
             }
@@ -106,14 +135,14 @@ impl Prepared {
     }
 }
 
-/// What a panic said.
+/// The message of a panic.
 fn words(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(|s| (*s).to_owned());
     text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default()
 }
 
 /// A case that shows nothing by accident tests nothing.
-fn check_blank(subject: &Subject, reference: &Discrete) -> Result<(), Complaint> {
+fn check_blank(subject: &PictureTest, reference: &Discrete) -> Result<(), Complaint> {
     let found = match reference.image.pixels().iter().any(|p| p[3] > 1e-6) {
         true => Shows::Something,
         false => Shows::Nothing,
@@ -124,7 +153,7 @@ fn check_blank(subject: &Subject, reference: &Discrete) -> Result<(), Complaint>
     }
 }
 
-fn check_oracle(subject: &Subject, reference: &Discrete) -> Result<(), Complaint> {
+fn check_oracle(subject: &PictureTest, reference: &Discrete) -> Result<(), Complaint> {
     let volume = match &subject.oracle {
         Oracle::Volume(volume) => volume,
         Oracle::EveryLevel(volume) => volume,
@@ -143,7 +172,7 @@ fn check_oracle(subject: &Subject, reference: &Discrete) -> Result<(), Complaint
 }
 
 /// f64, u32 and i32 are handed to backends as f32.
-fn stored_rounding(subject: &Subject) -> f64 {
+fn stored_rounding(subject: &PictureTest) -> f64 {
     use brickfield_core::ScalarType::{F32, F64, I32, U32};
     match subject.tree.scalar_type() {
         F64 | U32 | I32 | F32 => 5e-6,
@@ -151,18 +180,32 @@ fn stored_rounding(subject: &Subject) -> f64 {
     }
 }
 
+impl PreparedPicture {
+    /// The property of a device on which the tolerance depends: in fast mode the bits of its filter weights.
+    fn device_key(&self, device: &Capabilities) -> Option<u32> {
+        matches!(self.plans.replayed.sampling.mode(), Mode::Fast { .. }).then_some(device.sub_texel_bits)
+    }
+
+    /// Works out the tolerance on a device, unless it is known.
+    fn meet(&mut self, device: &Capabilities) -> Result<(), Complaint> {
+        let tolerance = self.tolerance.as_ref().map_err(Complaint::clone)?;
+        let on = || tolerance.on(&self.plans.replayed, &self.reference, device.sub_texel_bits);
+        self.on_devices.entry(self.device_key(device)).or_insert_with(on);
+        Ok(())
+    }
+}
+
 fn run_picture(
-    plans: &Plans,
-    reference: &Discrete,
+    picture: &mut PreparedPicture,
     capabilities: &Capabilities,
-    on: &mut Contestant,
+    on: &mut Candidate,
     mutant: Option<&Mutant>,
 ) -> Judged {
-    let tolerance = Tolerance::of(&plans.replayed, reference, capabilities);
-    let tolerance = match tolerance {
-        Ok(tolerance) => tolerance,
-        Err(complaint) => return refused(complaint),
-    };
+    if let Err(complaint) = picture.meet(capabilities) {
+        return refused(complaint);
+    }
+    let PreparedPicture { plans, reference, on_devices, .. } = &*picture;
+    let tolerance = &on_devices[&picture.device_key(capabilities)];
     let rendered = match mutant {
         Some(Mutant::Plan(mutant)) => on.render(&mutant.apply(&plans.replayed)),
         _ => on.render(&plans.replayed),
@@ -184,10 +227,10 @@ fn run_picture(
 
 fn refused(complaint: Complaint) -> Judged {
     let verdict = Verdict { errors: None, closest: None, used: f64::INFINITY, complaint: Some(complaint) };
-    Judged::Picture(Image::transparent(brickfield_core::glam::UVec2::ZERO), verdict)
+    Judged::Picture(Image::transparent(UVec2::ZERO), verdict)
 }
 
-fn run_function(test: &FunctionTest, on: &mut Contestant, mutant: Option<&Mutant>) -> Judged {
+fn run_function(test: &FunctionTest, on: &mut Candidate, mutant: Option<&Mutant>) -> Judged {
     let inputs: Vec<[f32; 4]> = test.points.iter().map(|p| p.input).collect();
     let evaluated = match mutant {
         Some(Mutant::Plan(mutant)) => on.evaluate(&mutant.apply(&test.plan), test.function, &inputs),
@@ -196,7 +239,10 @@ fn run_function(test: &FunctionTest, on: &mut Contestant, mutant: Option<&Mutant
     match evaluated {
         None => Judged::Absent,
         Some(Err(e)) => failed(e),
-        Some(Ok(outputs)) => Judged::Function(hold(test, &outputs)),
+        Some(Ok(outputs)) => {
+            let held = hold(test, &outputs);
+            Judged::Function(outputs, held)
+        }
     }
 }
 

@@ -5,15 +5,18 @@
 //! - `naive`: a second opinion on the reference itself, straight from the volume's voxels.
 //! - [`PlanMutant`], [`ShaderMutant`]: backends with one thing wrong; [`SelfCheck`] runs them.
 //! - [`Run`], [`Outcome`], [`Summary`]: pass, fail, unsupported, no-device, no-data. Absence is reported, never passed.
+//! - [`RecordWriter`], [`Comparison`]: a record of all answers, and a later run held against it.
 
+mod ahead;
+mod candidate;
 mod case;
 mod cases;
 mod check;
-mod contestant;
 mod naive;
 mod outcome;
 mod pictures;
 mod plan_mutants;
+mod record;
 mod rule;
 mod run;
 mod samples;
@@ -21,14 +24,16 @@ mod self_check;
 pub mod shader_mutants;
 mod surfaces;
 
-pub use case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, Plans, Point, Shows, Subject};
+pub use ahead::for_each_prepared;
+pub use candidate::Candidate;
+pub use case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, PictureTest, Plans, Point, Shows};
 pub use cases::all as cases;
 pub use check::{Judged, Obstacle, Prepared};
-pub use contestant::Contestant;
 pub use outcome::{Outcome, Status, Summary};
 pub use pictures::write_difference;
 pub use plan_mutants::PlanMutant;
-pub use rule::{Complaint, Tolerance, Verdict};
+pub use record::{Comparison, Difference, RecordEntry, RecordError, RecordWriter, read_record};
+pub use rule::{Complaint, PlanTolerance, Tolerance, Verdict};
 pub use run::Run;
 pub use self_check::SelfCheck;
 pub use shader_mutants::ShaderMutant;

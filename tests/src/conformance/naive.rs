@@ -1,6 +1,6 @@
 //! A second f64 opinion on a scene, straight from the volume and the camera.
 //!
-//! It shares neither bricks, nor index, nor ray frame, nor the ray walk with what it judges: if `prepare` cut bricks or
+//! It shares neither bricks, nor index, nor ray frame, nor the ray walk with the reference that it judges: if `prepare` cut bricks or
 //! anchored rays wrongly, the reference of the wrong plan would agree with every backend, and only this would not.
 
 use brickfield::Scene;
@@ -10,7 +10,7 @@ use brickfield_optics::RayState;
 use rayon::prelude::*;
 
 use super::samples::{Samples, VolumeSamples};
-use super::surfaces::pieces;
+use super::surfaces::segments;
 
 /// The picture of a scene at full resolution, from the volume's own samples.
 pub(crate) fn naive(volume: &Volume, side: BrickSide, scene: &Scene) -> Image<f64> {
@@ -27,11 +27,11 @@ fn pixel_of(volume: &Volume, side: BrickSide, scene: &Scene, (x, y): (u32, u32))
     let (ray, shown) = (in_index_space(volume, &world), shown(volume, scene));
     let span = if shown.is_empty() { None } else { ray.clip(&shown) };
     let Some(span) = span else { return [0.0; 4] };
-    let value = |t: f64| VolumeSamples(volume).cell(ray.at(t) - 0.5).map_or(0.0, |c| c.value());
+    let value = |t: f64| VolumeSamples(volume).around(ray.at(t) - 0.5).map_or(0.0, |c| c.value());
     let mut state = RayState::default();
-    for piece in pieces(volume, side, scene, (x, y), span) {
-        let values: Vec<f64> = scene.rule.nodes().iter().map(|n| value(piece.at(*n))).collect();
-        state.push(scene.rule.segment(&scene.transfer, &values, piece.length));
+    for segment in segments(volume, side, scene, (x, y), span) {
+        let values: Vec<f64> = scene.rule.nodes().iter().map(|n| value(segment.at(*n))).collect();
+        state.push(scene.rule.segment(&scene.transfer, &values, segment.length));
     }
     state.rgba()
 }

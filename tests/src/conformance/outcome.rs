@@ -1,4 +1,4 @@
-//! What came of it: one line per case and backend, a summary line, JSON.
+//! The outcomes of a run: one line per case and backend, a summary line, JSON.
 
 use std::fmt;
 
@@ -20,7 +20,7 @@ pub enum Status {
     NoData,
 }
 
-/// What came of a case on a backend.
+/// The outcome of a case on a backend.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Outcome {
     /// The case.

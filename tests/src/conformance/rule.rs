@@ -24,12 +24,12 @@ use crate::metrics::{Errors, MetricError, errors, quantile};
 const BULK: f64 = 0.999;
 /// The narrow bound of exact mode.
 const BULK_BOUND: f64 = 1e-5;
-/// What three quarters of a fast picture's pixels must be held to at least.
+/// The widest bound that is a test: three quarters of a fast picture's pixels have a bound that is no wider.
 const EMPTY_PROMISE: f64 = 0.2;
 /// Longer rays have no rule: a plan has at most so many segments.
 const MOST_SAMPLES: u64 = 2 * brickfield::MAX_SEGMENTS as u64;
 
-/// What each pixel may differ by, in every channel; rows from the top.
+/// The bound of each pixel's difference, in every channel; rows from the top.
 #[derive(Clone, Debug)]
 pub struct Tolerance {
     /// No pixel may differ by more.
@@ -38,7 +38,16 @@ pub struct Tolerance {
     bulk: Vec<f64>,
 }
 
-/// How far a picture was from what was asked, and what the rule says.
+/// The rule for a plan, as far as it does not depend on a device.
+#[derive(Clone, Debug)]
+pub struct PlanTolerance {
+    /// The wide bound of exact mode.
+    wide: f64,
+    /// In exact mode.
+    tolerance: Tolerance,
+}
+
+/// How far a picture is from its reference, and the verdict of the rule.
 #[derive(Clone, Debug)]
 pub struct Verdict {
     /// The errors, where the picture could be compared at all.
@@ -73,27 +82,41 @@ pub enum Complaint {
     Oracle { pixel: UVec2, difference: f64 },
 }
 
+impl PlanTolerance {
+    /// The rule for a plan, given its discrete answer.
+    ///
+    /// Cost: several times that of the discrete answer.
+    ///
+    /// # Errors
+    /// Rays that are too long for any rule.
+    pub fn of(plan: &FramePlan, reference: &Discrete) -> Result<PlanTolerance, Complaint> {
+        let wide = most_difference(plan)?;
+        let (blended, rounding) = (blending(plan, reference), position_rounding(plan));
+        let of_pixel = |bound: f64| reference.ambiguity.iter().zip(&blended).map(move |(a, b)| bound + a + b);
+        let bulk = of_pixel(BULK_BOUND).zip(&rounding).map(|(b, r)| b + r).collect();
+        Ok(PlanTolerance { wide, tolerance: Tolerance { most: of_pixel(wide).collect(), bulk } })
+    }
+
+    /// The rule on devices that filter with weights of so many bits; for the plan and the answer that it was made of.
+    pub fn on(&self, plan: &FramePlan, reference: &Discrete, sub_texel_bits: u32) -> Tolerance {
+        let Mode::Fast { transmittance_floor } = plan.sampling.mode() else { return self.tolerance.clone() };
+        let filter = filter_rounding(plan, sub_texel_bits);
+        let ends = |i: usize| {
+            let transmittance = 1.0 - reference.image.pixels()[i][3];
+            if transmittance <= transmittance_floor + filter[i] + self.wide { transmittance_floor } else { 0.0 }
+        };
+        let fast = |exact: &[f64]| exact.iter().enumerate().map(|(i, e)| e + filter[i] + ends(i)).collect();
+        Tolerance { most: fast(&self.tolerance.most), bulk: fast(&self.tolerance.bulk) }
+    }
+}
+
 impl Tolerance {
     /// The rule for a plan on a device, given the plan's discrete answer.
     ///
     /// # Errors
-    /// Rays that are too long for any rule.
+    /// As [`PlanTolerance::of`].
     pub fn of(plan: &FramePlan, reference: &Discrete, device: &Capabilities) -> Result<Tolerance, Complaint> {
-        let most = most_difference(plan)?;
-        let (blended, rounding) = (blending(plan, reference), position_rounding(plan));
-        let exact =
-            |bound: f64| reference.ambiguity.iter().zip(&blended).map(|(a, b)| bound + a + b).collect::<Vec<f64>>();
-        let narrow = |bulk: Vec<f64>| bulk.iter().zip(&rounding).map(|(b, r)| b + r).collect::<Vec<f64>>();
-        let Mode::Fast { transmittance_floor } = plan.sampling.mode() else {
-            return Ok(Tolerance { most: exact(most), bulk: narrow(exact(BULK_BOUND)) });
-        };
-        let filter = filter_rounding(plan, device.sub_texel_bits);
-        let ends = |i: usize| {
-            let transmittance = 1.0 - reference.image.pixels()[i][3];
-            if transmittance <= transmittance_floor + filter[i] + most { transmittance_floor } else { 0.0 }
-        };
-        let fast = |exact: Vec<f64>| exact.iter().enumerate().map(|(i, e)| e + filter[i] + ends(i)).collect();
-        Ok(Tolerance { most: fast(exact(most)), bulk: fast(narrow(exact(BULK_BOUND))) })
+        Ok(PlanTolerance::of(plan, reference)?.on(plan, reference, device.sub_texel_bits))
     }
 
     /// The bound that a quarter of the pixels exceeds, if it is so wide that hardly anything could fail.
@@ -129,8 +152,8 @@ impl Tolerance {
     }
 }
 
-/// What holds for every picture, whatever its reference: 0 <= alpha <= 1, and colours within alpha times the transfer
-/// function's greatest, to rounding: that of f32, and of what pixels are blended in.
+/// The law of every picture, whatever its reference: 0 <= alpha <= 1, and colours within alpha times the transfer
+/// function's greatest, to the rounding of f32 and of the format in which pixels are blended.
 pub(crate) fn bounded(image: &Image<f32>, plan: &FramePlan, reference: &Discrete) -> Option<Complaint> {
     let rounding = match plan.proxy.as_ref().map(|proxy| proxy.target()) {
         None | Some(Target::Float32) => 0.0,
@@ -175,7 +198,7 @@ fn most_difference(plan: &FramePlan) -> Result<f64, Complaint> {
     }
 }
 
-/// What blending polygons may change in each pixel; 0 where rays are cast.
+/// How much the blending of polygons may change each pixel; 0 where rays are cast.
 fn blending(plan: &FramePlan, reference: &Discrete) -> Vec<f64> {
     let rounding = match plan.proxy.as_ref().map(|proxy| proxy.target()) {
         None => 0.0,

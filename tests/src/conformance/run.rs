@@ -6,17 +6,19 @@ use std::time::Instant;
 use brickfield::BackendKind;
 use brickfield_core::Image;
 
+use super::candidate::Candidate;
 use super::case::Case;
 use super::check::{Judged, Obstacle, Prepared};
-use super::contestant::Contestant;
 use super::outcome::{Outcome, Status};
 use super::pictures::write_difference;
+use super::record::RecordEntry;
 use super::rule::Verdict;
+use crate::metrics::Worst;
 
-/// What a run is asked for.
+/// The run: candidates, and the options of the user.
 pub struct Run {
     /// The backends.
-    pub contestants: Vec<Contestant>,
+    pub candidates: Vec<Candidate>,
     /// Backends whose absence is a failure.
     pub required: Vec<BackendKind>,
     /// Where pictures of failing cases go.
@@ -24,18 +26,25 @@ pub struct Run {
 }
 
 impl Run {
-    /// Runs a case on every backend; `observe` sees each outcome as it comes.
-    pub fn case(&mut self, case: &Case, observe: &mut dyn FnMut(&Outcome)) -> Vec<Outcome> {
-        let prepared = match Prepared::of(case) {
+    /// Runs a case on every backend; `observe` sees each outcome as it comes, `keep` each answer.
+    pub fn case(
+        &mut self,
+        case: &Case,
+        prepared: &mut Result<Prepared, Obstacle>,
+        observe: &mut dyn FnMut(&Outcome),
+        keep: &mut dyn FnMut(RecordEntry),
+    ) -> Vec<Outcome> {
+        let prepared = match prepared {
             Ok(prepared) => prepared,
-            Err(obstacle) => return self.not_prepared(case, &obstacle, observe),
+            Err(obstacle) => return self.not_prepared(case, obstacle, observe),
         };
         let mut outcomes = Vec::new();
         let mut images: Vec<Option<Image<f32>>> = Vec::new();
-        for contestant in &mut self.contestants {
+        for candidate in &mut self.candidates {
             let begin = Instant::now();
-            let judged = prepared.run(contestant, None);
-            let (mut outcome, image) = told(case, contestant, judged, &prepared, &self.required, &self.pictures);
+            let judged = prepared.run(candidate, None);
+            judged.answer(&case.name, &candidate.name()).into_iter().for_each(&mut *keep);
+            let (mut outcome, image) = told(case, candidate, judged, prepared, &self.required, &self.pictures);
             outcome.milliseconds = begin.elapsed().as_secs_f64() * 1e3;
             observe(&outcome);
             outcomes.push(outcome);
@@ -53,8 +62,8 @@ impl Run {
             Obstacle::NoData(_) => Status::NoData,
             Obstacle::Refused(_) | Obstacle::Wrong(_) => Status::Fail,
         };
-        let outcome = |c: &Contestant| Outcome::plain(&case.name, &c.name(), status, obstacle.to_string());
-        let outcomes: Vec<Outcome> = self.contestants.iter().map(outcome).collect();
+        let outcome = |c: &Candidate| Outcome::plain(&case.name, &c.name(), status, obstacle.to_string());
+        let outcomes: Vec<Outcome> = self.candidates.iter().map(outcome).collect();
         outcomes.iter().for_each(observe);
         outcomes
     }
@@ -62,8 +71,8 @@ impl Run {
     /// Two backends that compile the same modules for the same adapter must agree to the bit.
     fn pairs(&self, case: &Case, images: &[Option<Image<f32>>]) -> Vec<Outcome> {
         let made = |i: usize| {
-            let contestant = &self.contestants[i];
-            Some((contestant, contestant.adapter_name()?, images[i].as_ref()?)).filter(|m| m.0.has_shaders())
+            let candidate = &self.candidates[i];
+            Some((candidate, candidate.adapter_name()?, images[i].as_ref()?)).filter(|m| m.0.has_shaders())
         };
         let all: Vec<_> = (0..images.len()).filter_map(made).collect();
         let mut outcomes = Vec::new();
@@ -88,21 +97,21 @@ fn equal_to_the_bit(case: &str, name: &str, a: &Image<f32>, b: &Image<f32>) -> O
     Outcome::plain(case, name, Status::Fail, note)
 }
 
-/// An outcome from what was judged; the picture where there is one.
+/// The outcome of a judgement, and the picture where there is one.
 fn told(
     case: &Case,
-    contestant: &Contestant,
+    candidate: &Candidate,
     judged: Judged,
     prepared: &Prepared,
     required: &[BackendKind],
     pictures: &std::path::Path,
 ) -> (Outcome, Option<Image<f32>>) {
-    let backend = contestant.name();
+    let backend = candidate.name();
     let plain = |status, note: String| (Outcome::plain(&case.name, &backend, status, note), None);
     match judged {
         Judged::Absent => {
-            let reason = contestant.absence().unwrap_or_default();
-            if required.contains(&contestant.kind()) {
+            let reason = candidate.absence().unwrap_or_default();
+            if required.contains(&candidate.kind()) {
                 return plain(Status::Fail, format!("required, but absent: {reason}"));
             }
             plain(Status::NoDevice, reason.to_owned())
@@ -110,12 +119,12 @@ fn told(
         Judged::Unsupported(e) => plain(Status::Unsupported, e.to_string()),
         Judged::Broken(e) => plain(Status::Fail, e.to_string()),
         Judged::Panicked(words) => plain(Status::Fail, format!("panicked: {words}")),
-        Judged::Function(Ok(worst)) => plain(Status::Pass, format!("at most {worst:.2} of the tolerance")),
-        Judged::Function(Err(e)) => plain(Status::Fail, e),
+        Judged::Function(_, Ok(worst)) => plain(Status::Pass, format!("at most {worst:.2} of the tolerance")),
+        Judged::Function(_, Err(e)) => plain(Status::Fail, e),
         Judged::Picture(image, verdict) => {
             let mut outcome = of_verdict(case, &backend, &verdict);
             if let (Status::Fail, Some(reference)) = (outcome.status, prepared.reference()) {
-                let file = pictures.join(format!("{}-{}.png", case.name.replace('/', "-"), contestant.kind()));
+                let file = pictures.join(format!("{}-{}.png", case.name.replace('/', "-"), candidate.kind()));
                 match write_difference(&file, &image, reference) {
                     Ok(()) => outcome.note += &format!("; see {}", file.display()),
                     Err(e) => outcome.note += &format!("; no picture: {e}"),
@@ -128,11 +137,11 @@ fn told(
 
 fn of_verdict(case: &Case, backend: &str, verdict: &Verdict) -> Outcome {
     let numbers = verdict.errors.as_ref().map(|e| {
-        let Errors { max, p, x, y } = Errors::of(e);
+        let (Worst { difference: max, pixel, .. }, p) = (e.worst, e.p999);
         let (at, bound) = verdict.closest.unwrap_or_default();
         format!(
-            "max {max:.2e} at ({x}, {y}), 99.9 % within {p:.2e}, at most {:.2} of its bound ({bound:.2e} at ({}, {}))",
-            verdict.used, at.x, at.y
+            "max {max:.2e} at ({}, {}), 99.9 % within {p:.2e}, at most {:.2} of its bound ({bound:.2e} at ({}, {}))",
+            pixel.x, pixel.y, verdict.used, at.x, at.y
         )
     });
     let numbers = numbers.unwrap_or_default();
@@ -141,24 +150,10 @@ fn of_verdict(case: &Case, backend: &str, verdict: &Verdict) -> Outcome {
         Some(complaint) => (Status::Fail, format!("{complaint}; {numbers}")),
     };
     let mut outcome = Outcome::plain(&case.name, backend, status, note);
-    if let Some(e) = verdict.errors.as_ref().map(Errors::of) {
-        outcome.max_difference = Some(e.max);
-        outcome.p999 = Some(e.p);
-        outcome.worst_pixel = Some([e.x, e.y]);
+    if let Some(e) = &verdict.errors {
+        outcome.max_difference = Some(e.worst.difference);
+        outcome.p999 = Some(e.p999);
+        outcome.worst_pixel = Some(e.worst.pixel.to_array());
     }
     outcome
-}
-
-/// The numbers that a report shows.
-struct Errors {
-    max: f64,
-    p: f64,
-    x: u32,
-    y: u32,
-}
-
-impl Errors {
-    fn of(e: &crate::metrics::Errors) -> Errors {
-        Errors { max: e.worst.difference, p: e.p999, x: e.worst.pixel.x, y: e.worst.pixel.y }
-    }
 }

@@ -6,7 +6,7 @@ use brickfield_core::glam::{DVec3, UVec3};
 
 /// The eight data values around a position, x varying fastest, and where it lies between them.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Cell {
+pub(crate) struct Corners {
     values: [f64; 8],
     fraction: DVec3,
 }
@@ -14,7 +14,7 @@ pub(crate) struct Cell {
 /// Something that has samples around a position in sample space.
 pub(crate) trait Samples: Sync {
     /// The cell that holds `q`; `None` where nothing is visible.
-    fn cell(&self, q: DVec3) -> Option<Cell>;
+    fn around(&self, q: DVec3) -> Option<Corners>;
 }
 
 /// A volume's own voxels: neither bricks nor an index.
@@ -23,7 +23,7 @@ pub(crate) struct VolumeSamples<'a>(pub(crate) &'a Volume);
 /// The bricks of a plan.
 pub(crate) struct PlanSamples<'a>(pub(crate) &'a FramePlan);
 
-impl Cell {
+impl Corners {
     /// The trilinear value: the weighted sum of the corners.
     pub(crate) fn value(&self) -> f64 {
         let weight =
@@ -33,7 +33,7 @@ impl Cell {
 }
 
 impl Samples for VolumeSamples<'_> {
-    fn cell(&self, q: DVec3) -> Option<Cell> {
+    fn around(&self, q: DVec3) -> Option<Corners> {
         let dims = self.0.grid().dims();
         let last = (dims - 1).as_dvec3();
         let q = q.clamp(DVec3::ZERO, last);
@@ -44,12 +44,12 @@ impl Samples for VolumeSamples<'_> {
             let p = corner(c);
             self.0.voxels().at(p.x as usize + dims.x as usize * (p.y as usize + dims.y as usize * p.z as usize))
         };
-        Some(Cell { values: std::array::from_fn(value), fraction: q - low })
+        Some(Corners { values: std::array::from_fn(value), fraction: q - low })
     }
 }
 
 impl Samples for PlanSamples<'_> {
-    fn cell(&self, q: DVec3) -> Option<Cell> {
+    fn around(&self, q: DVec3) -> Option<Corners> {
         let plan = self.0;
         let n = plan.bricks.side().n_samples() as usize;
         let q = q.clamp(DVec3::ZERO, plan.last_sample());
@@ -63,6 +63,6 @@ impl Samples for PlanSamples<'_> {
             let i = p.x as usize + n * (p.y as usize + n * p.z as usize);
             plan.bricks.decode().value(plan.bricks.read(slot as usize * n.pow(3) + i))
         };
-        Some(Cell { values: std::array::from_fn(value), fraction: s - low })
+        Some(Corners { values: std::array::from_fn(value), fraction: s - low })
     }
 }

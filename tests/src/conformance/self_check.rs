@@ -5,47 +5,47 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::candidate::Candidate;
 use super::case::{Case, Mutant};
 use super::check::{Judged, Obstacle, Prepared};
-use super::contestant::Contestant;
 use super::outcome::{Outcome, Status};
 
 /// Holds cases against their mutants.
-pub struct SelfCheck<'a> {
-    contestants: &'a mut [Contestant],
-    patched: BTreeMap<Mutant, Result<Contestant, String>>,
+#[derive(Default)]
+pub struct SelfCheck {
+    patched: BTreeMap<Mutant, Result<Candidate, String>>,
     caught: BTreeSet<Mutant>,
     run: BTreeSet<Mutant>,
 }
 
-/// What became of a mutant in a case.
+/// The fate of a mutant in a case.
 enum Fate {
     Caught,
     Survived(String),
     NotRun(String),
 }
 
-impl<'a> SelfCheck<'a> {
-    /// With these backends.
-    pub fn new(contestants: &'a mut [Contestant]) -> SelfCheck<'a> {
-        SelfCheck { contestants, patched: BTreeMap::new(), caught: BTreeSet::new(), run: BTreeSet::new() }
-    }
-
-    /// Runs a case against the mutants that it names. It passes if it catches all of those that can be run here, and at
-    /// least one.
-    pub fn case(&mut self, case: &Case) -> Outcome {
+impl SelfCheck {
+    /// Runs a case against the mutants that it names. It passes if it catches all mutants that can be run on these
+    /// candidates, and at least one.
+    pub fn case(
+        &mut self,
+        case: &Case,
+        prepared: &mut Result<Prepared, Obstacle>,
+        candidates: &mut [Candidate],
+    ) -> Outcome {
         let plain = |status, note: String| Outcome::plain(&case.name, "mutants", status, note);
         if case.mutants.is_empty() {
             return plain(Status::Fail, "names no mutant that it must catch".into());
         }
-        let prepared = match Prepared::of(case) {
+        let prepared = match prepared {
             Ok(prepared) => prepared,
             Err(Obstacle::NoData(e)) => return plain(Status::NoData, e.to_string()),
             Err(e) => return plain(Status::Fail, e.to_string()),
         };
         let (mut caught, mut survivors, mut not_run) = (Vec::new(), Vec::new(), Vec::new());
         for mutant in &case.mutants {
-            match self.fate(&prepared, mutant) {
+            match self.fate(prepared, mutant, candidates) {
                 Fate::Caught => caught.push(mutant.name()),
                 Fate::Survived(how) => survivors.push(format!("{mutant} ({how})")),
                 Fate::NotRun(why) => not_run.push(format!("{mutant} ({why})")),
@@ -58,10 +58,10 @@ impl<'a> SelfCheck<'a> {
         }
     }
 
-    /// Mutants that no case has caught: one failure each, or no device if it could not be run.
-    pub fn uncaught(&self) -> Vec<Outcome> {
+    /// Mutants that no case has caught: one failure each, or no device if it could not be run on these backends.
+    pub fn uncaught(&self, candidates: &[Candidate]) -> Vec<Outcome> {
         let missing = Mutant::all().into_iter().filter(|m| !self.caught.contains(m));
-        let outcome = |m: Mutant| match self.run.contains(&m) || self.can_run(&m) {
+        let outcome = |m: Mutant| match self.run.contains(&m) || candidates.iter().any(|c| c.can_run(&m)) {
             true => Outcome::plain(m.name(), "mutants", Status::Fail, "no case has caught it"),
             false => Outcome::plain(m.name(), "mutants", Status::NoDevice, "no backend to run it on"),
         };
@@ -73,18 +73,14 @@ impl<'a> SelfCheck<'a> {
         (self.caught.len(), Mutant::all().len())
     }
 
-    fn can_run(&self, mutant: &Mutant) -> bool {
-        self.contestants.iter().any(|c| c.can_run(mutant))
-    }
-
-    fn fate(&mut self, prepared: &Prepared, mutant: &Mutant) -> Fate {
+    fn fate(&mut self, prepared: &mut Prepared, mutant: &Mutant, candidates: &mut [Candidate]) -> Fate {
         let judged = match mutant {
-            Mutant::Plan(_) => match self.contestants.iter_mut().find(|c| c.can_run(mutant)) {
-                Some(contestant) => prepared.run(contestant, Some(mutant)),
+            Mutant::Plan(_) => match candidates.iter_mut().find(|c| c.can_run(mutant)) {
+                Some(candidate) => prepared.run(candidate, Some(mutant)),
                 None => return Fate::NotRun("no backend".into()),
             },
-            Mutant::Shader(_) => match self.patched(mutant) {
-                Some(Ok(contestant)) => prepared.run(contestant, Some(mutant)),
+            Mutant::Shader(_) => match self.patched(mutant, candidates) {
+                Some(Ok(candidate)) => prepared.run(candidate, Some(mutant)),
                 Some(Err(e)) => return Fate::Survived(e.clone()),
                 None => return Fate::NotRun("no backend with shaders".into()),
             },
@@ -98,9 +94,9 @@ impl<'a> SelfCheck<'a> {
     }
 
     /// A backend that compiles the mutant's shaders, opened once.
-    fn patched(&mut self, mutant: &Mutant) -> Option<&mut Result<Contestant, String>> {
+    fn patched(&mut self, mutant: &Mutant, candidates: &[Candidate]) -> Option<&mut Result<Candidate, String>> {
         let Mutant::Shader(shader) = mutant else { return None };
-        let honest = self.contestants.iter().find(|c| c.can_run(mutant))?;
+        let honest = candidates.iter().find(|c| c.can_run(mutant))?;
         let open = || match shader.apply() {
             Err(e) => Err(e.to_string()),
             Ok(library) => honest.with_library(library).ok_or_else(|| "cannot be opened with other shaders".to_owned()),
@@ -117,8 +113,8 @@ fn fate_of(judged: Judged) -> Fate {
             Some(_) => Fate::Caught,
             None => Fate::Survived(verdict.errors.map_or(String::new(), |e| format!("max {:.1e}", e.worst.difference))),
         },
-        Judged::Function(Err(_)) => Fate::Caught,
-        Judged::Function(Ok(worst)) => Fate::Survived(format!("{worst:.2} of the tolerance")),
+        Judged::Function(_, Err(_)) => Fate::Caught,
+        Judged::Function(_, Ok(worst)) => Fate::Survived(format!("{worst:.2} of the tolerance")),
         Judged::Absent => Fate::NotRun("absent".into()),
         Judged::Unsupported(e) | Judged::Broken(e) => Fate::Survived(e.to_string()),
         Judged::Panicked(words) => Fate::Survived(format!("panicked: {words}")),

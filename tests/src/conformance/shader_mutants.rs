@@ -1,4 +1,7 @@
-//! Shaders with one thing wrong: a patch of the source text that backends compile, so the whole real path runs.
+//! Shaders with one thing wrong: a patch of the source that backends compile, so the whole real path runs.
+//!
+//! A patch names a module, a function or constant of it, and an expression or statement that occurs there once. Comments and
+//! white space of the source do not matter.
 
 use brickfield_shaders::{PatchError, ShaderLibrary};
 
@@ -8,6 +11,8 @@ pub struct ShaderMutant {
     /// The mutant's name in reports.
     pub name: &'static str,
     module: &'static str,
+    /// A function or a constant.
+    declaration: &'static str,
     from: &'static str,
     to: &'static str,
 }
@@ -18,14 +23,20 @@ impl ShaderMutant {
     /// # Errors
     /// If the sources have changed so that the patch does not fit: then the mutant needs a new one.
     pub fn apply(&self) -> Result<ShaderLibrary, PatchError> {
-        ShaderLibrary::embedded().patched(self.module, self.from, self.to)
+        ShaderLibrary::embedded().patched_in(self.module, self.declaration, self.from, self.to)
     }
 }
 
 macro_rules! mutants {
-    ($($(#[$doc:meta])* $id:ident: $name:literal, $module:literal, $from:literal => $to:literal;)*) => {
+    ($($(#[$doc:meta])* $id:ident: $name:literal, $module:literal, $declaration:literal, $from:literal => $to:literal;)*) => {
         $($(#[$doc])* pub const $id: ShaderMutant =
-            ShaderMutant { name: concat!("shader/", $name), module: $module, from: $from, to: $to };)*
+            ShaderMutant {
+                name: concat!("shader/", $name),
+                module: $module,
+                declaration: $declaration,
+                from: $from,
+                to: $to,
+            };)*
         /// All shader mutants.
         pub const ALL: &[ShaderMutant] = &[$($id),*];
     };
@@ -33,122 +44,121 @@ macro_rules! mutants {
 
 mutants! {
     /// The nearest sample instead of the trilinear value.
-    NEAREST: "nearest", "bricks", "let f = s - cell;" => "let f = floor(s - cell + 0.5);";
+    NEAREST: "nearest", "bricks", "filtered", "let f = s - cell;" => "let f = floor(s - cell + 0.5);";
     /// The wrong weight along y.
-    LERP_SWAPPED: "lerp-swapped", "bricks", "return lerp(lerp(x00, x10, f.y), lerp(x01, x11, f.y), f.z);"
+    LERP_SWAPPED: "lerp-swapped", "bricks", "filtered", "return lerp(lerp(x00, x10, f.y), lerp(x01, x11, f.y), f.z);"
         => "return lerp(lerp(x00, x10, f.x), lerp(x01, x11, f.x), f.z);";
     /// Positions are not clamped to the first and last sample.
-    NO_CLAMP: "no-clamp", "bricks", "let s = clamp(local(block, p), vec3f(0.0), block.last);\n    return filtered"
-        => "let s = local(block, p);\n    return filtered";
+    NO_CLAMP: "no-clamp", "bricks", "value_at", "clamp(local(block, p), vec3f(0.0), block.last)" => "local(block, p)";
     /// Index rows are as long as columns.
-    INDEX_STRIDE: "index-stride", "bricks", "index[cell.x + dims.x * (cell.y + dims.y * cell.z)]"
+    INDEX_STRIDE: "index-stride", "bricks", "block_at", "index[cell.x + dims.x * (cell.y + dims.y * cell.z)]"
         => "index[cell.x + dims.y * (cell.y + dims.x * cell.z)]";
     /// The next slot's brick.
-    ATLAS_ROW: "atlas-row", "bricks", "let row = slot / bricks.x;" => "let row = slot / bricks.y;";
+    ATLAS_ROW: "atlas-row", "bricks", "texel_of", "let row = slot / bricks.x;" => "let row = slot / bricks.y;";
     /// Coarse bricks are read as if they were fine.
-    LEVEL_SCALE: "level-scale", "bricks", "block.scale = 1.0 / f32(1u << level);" => "block.scale = 1.0;";
+    LEVEL_SCALE: "level-scale", "bricks", "block_of", "block.scale = 1.0 / f32(1u << level);" => "block.scale = 1.0;";
     /// Coarse bricks begin at the cell, not at their block.
-    BLOCK_CORNER: "block-corner", "bricks", "let first = (cell >> vec3u(level)) << vec3u(level);" => "let first = cell;";
+    BLOCK_CORNER: "block-corner", "bricks", "block_of", "let first = (cell >> vec3u(level)) << vec3u(level);" => "let first = cell;";
     /// The hardware filter looks half a texel beside.
-    HALF_TEXEL: "half-texel", "bricks", "(texel + s + 0.5)" => "(texel + s)";
+    HALF_TEXEL: "half-texel", "bricks", "filtered", "(texel + s + 0.5)" => "(texel + s)";
     /// alpha = tau h.
-    ALPHA_LINEAR: "alpha-linear", "scalar", "select(1.0 - exp(-x), series, x < 0.25)" => "min(x, 1.0)";
+    ALPHA_LINEAR: "alpha-linear", "scalar", "alpha", "select(1.0 - exp(-x), series, x < 0.25)" => "min(x, 1.0)";
     /// alpha = 1 - e^-x at every x: no digits near 0.
-    ALPHA_CANCELS: "alpha-cancels", "scalar", "select(1.0 - exp(-x), series, x < 0.25)" => "1.0 - exp(-x)";
+    ALPHA_CANCELS: "alpha-cancels", "scalar", "alpha", "select(1.0 - exp(-x), series, x < 0.25)" => "1.0 - exp(-x)";
     /// depth = alpha for thin segments.
-    DEPTH_LINEAR: "depth-linear", "scalar", "select(direct, series, a < 0.25)" => "select(direct, a, a < 0.25)";
+    DEPTH_LINEAR: "depth-linear", "scalar", "depth", "select(direct, series, a < 0.25)" => "select(direct, a, a < 0.25)";
     /// Segments do not attenuate themselves.
-    NO_SELF_ATTENUATION: "no-self-attenuation", "quadrature", "vec4f(alpha(d) * optics.rgb, d)"
+    NO_SELF_ATTENUATION: "no-self-attenuation", "quadrature", "exponential", "vec4f(alpha(d) * optics.rgb, d)"
         => "vec4f(d * optics.rgb, d)";
-    /// Segments are not attenuated by those before.
-    NO_ATTENUATION: "no-attenuation", "quadrature", "ray.rgb + exp(-ray.w) * segment.rgb" => "ray.rgb + segment.rgb";
+    /// Segments are not attenuated by the segments before.
+    NO_ATTENUATION: "no-attenuation", "quadrature", "behind", "ray.rgb + exp(-ray.w) * segment.rgb" => "ray.rgb + segment.rgb";
     /// The far Gauss node is not behind the near one.
-    GAUSS_UNWEIGHTED: "gauss-unweighted", "quadrature", "near.w + far.w * exp(-0.57735027 * d)" => "near.w + far.w";
+    GAUSS_UNWEIGHTED: "gauss-unweighted", "quadrature", "gauss2", "near.w + far.w * exp(-0.57735027 * d)" => "near.w + far.w";
     /// A Gauss node at a quarter of the segment.
-    GAUSS_NODE: "gauss-node", "quadrature", "const FIRST_NODE: f32 = 0.21132486540518713;" => "const FIRST_NODE: f32 = 0.25;";
+    GAUSS_NODE: "gauss-node", "quadrature", "FIRST_NODE", "0.21132486540518713" => "0.25";
     /// Euler's opacity is not depth.
-    EULER_DEPTH: "euler-depth", "quadrature", "vec4f(a * optics.rgb, depth(a))" => "vec4f(a * optics.rgb, a)";
+    EULER_DEPTH: "euler-depth", "quadrature", "euler", "vec4f(a * optics.rgb, depth(a))" => "vec4f(a * optics.rgb, a)";
     /// The value at the start of the midpoint rule's segments.
-    MIDPOINT_LEFT: "midpoint-left", "quadrature", "const FIRST_NODE: f32 = 0.5;" => "const FIRST_NODE: f32 = 0.0;";
+    MIDPOINT_LEFT: "midpoint-left", "quadrature", "FIRST_NODE", "0.5" => "0.0";
     /// Pre-integrated pieces have the mean colour of their ends.
-    PIECE_MEAN: "piece-mean", "preintegrated", "(2.0 * near.w + far.w) / (3.0 * max(total, 1e-37))" => "0.5";
+    PIECE_MEAN: "piece-mean", "preintegrated", "linear_piece", "(2.0 * near.w + far.w) / (3.0 * max(total, 1e-37))" => "0.5";
     /// The transfer function is continuous from the left.
-    LEFT_CONTINUOUS: "left-continuous", "transfer", "knots[next].value.x <= value" => "knots[next].value.x < value";
+    LEFT_CONTINUOUS: "left-continuous", "transfer", "further", "knots[next].value.x <= value" => "knots[next].value.x < value";
     /// The transfer function goes on beyond its last knot.
-    NOT_CONSTANT_OUTSIDE: "not-constant-outside", "transfer", "clamp((value - low.value.x) * low.value.y, 0.0, 1.0)"
+    NOT_CONSTANT_OUTSIDE: "not-constant-outside", "transfer", "on_line", "clamp((value - low.value.x) * low.value.y, 0.0, 1.0)"
         => "(value - low.value.x) * low.value.y";
     /// Steps instead of lines between knots.
-    STEPS: "steps", "transfer", "low.optics + (high - low.optics) * f" => "low.optics";
+    STEPS: "steps", "transfer", "on_line", "low.optics + (high - low.optics) * f" => "low.optics";
     /// Rays pass the pixels' corners.
-    PIXEL_CORNER: "pixel-corner", "rays", "let at = pixel + 0.5 - 0.5 * vec2f(frame.size.xy);"
+    PIXEL_CORNER: "pixel-corner", "rays", "pixel_ray", "let at = pixel + 0.5 - 0.5 * vec2f(frame.size.xy);"
         => "let at = pixel - 0.5 * vec2f(frame.size.xy);";
     /// Directions are not normalised.
-    NOT_NORMALISED: "not-normalised", "rays", "let length = sqrt(1.0 + square);" => "let length = 1.0;";
+    NOT_NORMALISED: "not-normalised", "rays", "pixel_ray", "let length = sqrt(1.0 + square);" => "let length = 1.0;";
     /// The phase of the shells is that of a plane.
-    FLAT_SHELLS: "flat-shells", "rays", "frame.anchor_down.w * (square / (1.0 + length))" => "0.0";
+    FLAT_SHELLS: "flat-shells", "rays", "pixel_ray", "frame.anchor_down.w * (square / (1.0 + length))" => "0.0";
     /// The first segment is not shortened.
-    FIRST_NOT_CUT: "first-not-cut", "segments", "select(boundary(ray, k), walk.span.start, k == walk.first)"
+    FIRST_NOT_CUT: "first-not-cut", "segments", "piece_of", "select(boundary(ray, k), walk.span.start, k == walk.first)"
         => "boundary(ray, k)";
     /// The last segment is not shortened.
-    LAST_NOT_CUT: "last-not-cut", "segments", "select(boundary(ray, k + 1.0), walk.span.end, k == walk.last)"
+    LAST_NOT_CUT: "last-not-cut", "segments", "piece_of", "select(boundary(ray, k + 1.0), walk.span.end, k == walk.last)"
         => "boundary(ray, k + 1.0)";
     /// The first segment is dropped.
-    FIRST_DROPPED: "first-dropped", "segments", "walk.first = floor(" => "walk.first = ceil(";
+    FIRST_DROPPED: "first-dropped", "segments", "walk_in", "walk.first = floor(" => "walk.first = ceil(";
     /// The last segment is dropped.
-    LAST_DROPPED: "last-dropped", "segments", "walk.last = ceil(segments_before(ray, walk.span.end)) - 1.0;"
+    LAST_DROPPED: "last-dropped", "segments", "walk_in", "walk.last = ceil(segments_before(ray, walk.span.end)) - 1.0;"
         => "walk.last = ceil(segments_before(ray, walk.span.end)) - 2.0;";
     /// A brick keeps the ray for two segments too many.
-    OVERSTAYS: "overstays", "segments", "stop = max(k + 1.0, min(stop, min(walk.end, walk.last)));"
+    OVERSTAYS: "overstays", "segments", "stop_in", "stop = max(k + 1.0, min(stop, min(walk.end, walk.last)));"
         => "stop = max(k + 1.0, min(stop + 2.0, min(walk.end, walk.last)));";
-    /// A jump over a transparent block goes 24 segments too far: two reach only the dark rim of what follows.
-    JUMPS_TOO_FAR: "jumps-too-far", "march", "k = block_stop;" => "k = block_stop + 24.0;";
+    /// A jump over a transparent block goes 24 segments too far: two would reach only the dark rim of the next block.
+    JUMPS_TOO_FAR: "jumps-too-far", "march", "integrate", "k = block_stop;" => "k = block_stop + 24.0;";
     /// A leap over dark macrocells goes 8 segments too far.
-    LEAPS_TOO_FAR: "leaps-too-far", "march", "  k = end;" => "  k = end + 8.0;";
+    LEAPS_TOO_FAR: "leaps-too-far", "march", "integrate", "k = end;" => "k = end + 8.0;";
     /// The same, in bricks with segments of their own.
-    LEAPS_TOO_FAR_IN_BRICK: "leaps-too-far-in-brick", "march", "walk.k = end;" => "walk.k = end + 8.0;";
+    LEAPS_TOO_FAR_IN_BRICK: "leaps-too-far-in-brick", "march", "integrate_in", "walk.k = end;" => "walk.k = end + 8.0;";
     /// Of segments with two nodes, the far one may lie anywhere.
-    FAR_NODE_FORGOTTEN: "far-node-forgotten", "segments", "stop = select(k, stop, own);" => "";
-    /// Macrocells are taken for those of the next row.
-    MACROCELL_ROW: "macrocell-row", "bricks", "at.x + n * (at.y + n * (at.z + n * block.slot))"
+    FAR_NODE_FORGOTTEN: "far-node-forgotten", "segments", "stop_in", "stop = select(k, stop, own);" => "";
+    /// Macrocells of another row are read.
+    MACROCELL_ROW: "macrocell-row", "bricks", "macrocells_at", "at.x + n * (at.y + n * (at.z + n * block.slot))"
         => "at.y + n * (at.x + n * (at.z + n * block.slot))";
-    /// Beams are taken for those of the tiles mirrored at the diagonal.
-    BEAM_MIRRORED: "beam-mirrored", "march", "beams[tile.x + tile.y * n_columns]" => "beams[tile.y + tile.x * n_columns]";
+    /// The beam of the tile mirrored at the diagonal is read.
+    BEAM_MIRRORED: "beam-mirrored", "march", "march", "beams[tile.x + tile.y * n_columns]" => "beams[tile.y + tile.x * n_columns]";
     /// Rays end where their beam has come half its way.
-    BEAM_HALVED: "beam-halved", "march", "walk.end = min(walk.end, beam.y);"
+    BEAM_HALVED: "beam-halved", "march", "march", "walk.end = min(walk.end, beam.y);"
         => "walk.end = min(walk.end, 0.5 * (beam.x + beam.y));";
-    /// What earlier passes saw of a ray is forgotten.
-    PASS_FORGETS: "pass-forgets", "march", "before = seen_before[slot];" => "before = vec4f(0.0);";
+    /// The light of a ray's earlier passes is forgotten.
+    PASS_FORGETS: "pass-forgets", "march", "integrate_on", "before = seen_before[slot];" => "before = vec4f(0.0);";
     /// A pass begins at the ray's first segment.
-    PASS_RESTARTS: "pass-restarts", "march", "walk.k = max(walk.k, frame.visible_max.w);" => "";
+    PASS_RESTARTS: "pass-restarts", "march", "integrate_on", "walk.k = max(walk.k, frame.visible_max.w);" => "";
     /// 16-bit samples are counted from the first knot's as fractions, not as integers.
-    FRACTIONS_OF_16_BITS: "fractions-of-16-bits", "bricks",
+    FRACTIONS_OF_16_BITS: "fractions-of-16-bits", "bricks", "load",
         "round(textureLoad(atlas, i, 0).x * 65535.0) - frame.last_sample.w"
         => "(textureLoad(atlas, i, 0).x - frame.last_sample.w / 65535.0) * 65535.0";
     /// Rays end at a transmittance of 1/5.
-    ENDS_EARLY: "ends-early", "march", "exp(-seen.w) < frame.direction_down.w" => "exp(-seen.w) < 0.2";
+    ENDS_EARLY: "ends-early", "march", "ended", "exp(-seen.w) < frame.direction_down.w" => "exp(-seen.w) < 0.2";
     /// Bricks have the steps of level 0, whatever their level.
-    STEPS_OF_LEVEL_0: "steps-of-level-0", "segments", "own.apart *= f32(stride_of(block));" => "";
+    STEPS_OF_LEVEL_0: "steps-of-level-0", "segments", "in_steps_of", "own.apart *= f32(stride_of(block));" => "";
     /// A brick's segments go on to the end of the ray.
-    BRICK_NOT_LEFT: "brick-not-left", "march", "span.end = min(exit, visible.end);" => "span.end = visible.end;";
+    BRICK_NOT_LEFT: "brick-not-left", "march", "integrate", "span.end = min(exit, visible.end);" => "span.end = visible.end;";
     /// Nominal lengths have the angle's stretch.
-    NOMINAL_STRETCHED: "nominal-stretched", "segments", "piece.weight = ray.apart;" => "piece.weight = step_of(ray);";
+    NOMINAL_STRETCHED: "nominal-stretched", "segments", "whole_piece", "piece.weight = ray.apart;" => "piece.weight = step_of(ray);";
     /// The segments of polygons begin at the surface before, even outside of the brick.
-    POLYGON_NOT_CUT: "polygon-not-cut", "proxy", "let start = max(span.start, near);" => "let start = near;";
+    POLYGON_NOT_CUT: "polygon-not-cut", "proxy", "piece_before", "let start = max(span.start, near);" => "let start = near;";
     /// The last segment of a brick begins a surface too early.
-    LAST_SURFACE_BESIDE: "last-surface-beside", "proxy", "let k = ceil(segments_before(ray, span.end)) - 1.0;\n    // The quotient is corrected by looking.\n    return select("
-        => "let k = ceil(segments_before(ray, span.end)) - 2.0;\n    return k; return select(";
+    LAST_SURFACE_BESIDE: "last-surface-beside", "proxy", "last_surface", "select(select(k, k - 1.0, boundary(ray, k) >= span.end), k + 1.0, boundary(ray, k + 1.0) < span.end)"
+        => "k - 1.0";
     /// Polygons show the brick that is drawn before theirs.
-    FOREIGN_BRICK: "foreign-brick", "proxy", "drawn[polygon.brick]" => "drawn[max(polygon.brick, 1u) - 1u]";
+    FOREIGN_BRICK: "foreign-brick", "proxy", "shade", "drawn[polygon.brick]" => "drawn[max(polygon.brick, 1u) - 1u]";
     /// Planes parallel to the picture are as far apart on every ray.
-    PLANES_NOT_STRETCHED: "planes-not-stretched", "rays", "ray.stretch = length;"
+    PLANES_NOT_STRETCHED: "planes-not-stretched", "rays", "pixel_ray", "ray.stretch = length;"
         => "ray.stretch = 1.0;";
-    /// Facets are those of the neighbouring square.
-    FACET_BESIDE: "facet-beside", "rays", "return 2u * (square.x + square.y" => "return 2u * (square.x + 1u + square.y";
+    /// The facet of the neighbouring square is read.
+    FACET_BESIDE: "facet-beside", "rays", "facet_of", "return 2u * (square.x + square.y" => "return 2u * (square.x + 1u + square.y";
     /// Rays take the least steep stack of planes.
-    STACK_FLAT: "stack-flat", "rays", "let axis = select(select(2u, 1u, steep.y >= steep.z), 0u, steep.x >= steep.y && steep.x >= steep.z);"
+    STACK_FLAT: "stack-flat", "rays", "stack_of", "let axis = select(select(2u, 1u, steep.y >= steep.z), 0u, steep.x >= steep.y && steep.x >= steep.z);"
         => "let axis = select(select(2u, 1u, steep.y < steep.z), 0u, steep.x < steep.y && steep.x < steep.z);";
     /// Opacity is the depth.
-    OPACITY_IS_DEPTH: "opacity-is-depth", "march", "vec4f(seen.rgb, alpha(seen.w))" => "vec4f(seen.rgb, min(seen.w, 1.0))";
+    OPACITY_IS_DEPTH: "opacity-is-depth", "march", "march", "vec4f(seen.rgb, alpha(seen.w))" => "vec4f(seen.rgb, min(seen.w, 1.0))";
 }
 
 #[cfg(test)]

@@ -7,15 +7,15 @@ use brickfield_core::{BrickSide, IndexPos, Ray, Span, Volume};
 
 /// One segment of a ray.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Piece {
+pub(super) struct Segment {
     start: f64,
     end: f64,
     /// The length that its light is computed for, in world units.
     pub(super) length: f64,
 }
 
-impl Piece {
-    /// The parameter at fraction `x` of the piece.
+impl Segment {
+    /// The parameter at fraction `x` of the segment.
     pub(super) fn at(self, x: f64) -> f64 {
         self.start * (1.0 - x) + self.end * x
     }
@@ -29,7 +29,13 @@ struct Surfaces {
 }
 
 /// The segments of pixel (x, y)'s ray in `span`, at full resolution, in bricks of `side`.
-pub(super) fn pieces(volume: &Volume, side: BrickSide, scene: &Scene, (x, y): (u32, u32), span: Span) -> Vec<Piece> {
+pub(super) fn segments(
+    volume: &Volume,
+    side: BrickSide,
+    scene: &Scene,
+    (x, y): (u32, u32),
+    span: Span,
+) -> Vec<Segment> {
     let nominal = scene.step_voxels * volume.grid().spacing().min_element();
     let ray = scene.camera.pixel_rays(scene.size).pixel_ray(x, y);
     let surfaces = surfaces(volume, scene, (x, y), &ray, nominal);
@@ -97,19 +103,19 @@ fn across_bricks(volume: &Volume, side: BrickSide, ray: &Ray, span: Span) -> Vec
     cuts.windows(2).map(|w| Span { start: w[0], end: w[1] }).collect()
 }
 
-fn between(surfaces: Surfaces, span: Span, lengths: Lengths, nominal: f64) -> Vec<Piece> {
+fn between(surfaces: Surfaces, span: Span, lengths: Lengths, nominal: f64) -> Vec<Segment> {
     let Surfaces { origin, step } = surfaces;
     let (first, last) = (((span.start - origin) / step).floor(), ((span.end - origin) / step).ceil());
     let uncut = (0..(last - first) as u64).map(|i| origin + (first + i as f64) * step);
-    let pieces = uncut.filter_map(|start| match lengths {
+    let segments = uncut.filter_map(|start| match lengths {
         Lengths::True => {
             let (start, end) = (start.max(span.start), (start + step).min(span.end));
-            (start < end).then_some(Piece { start, end, length: end - start })
+            (start < end).then_some(Segment { start, end, length: end - start })
         }
         Lengths::Nominal => {
             let middle = start + 0.5 * step;
-            (span.start <= middle && middle < span.end).then_some(Piece { start, end: start + step, length: nominal })
+            (span.start <= middle && middle < span.end).then_some(Segment { start, end: start + step, length: nominal })
         }
     });
-    pieces.collect()
+    segments.collect()
 }

@@ -18,7 +18,7 @@ pub struct LamarArgs {
     /// The paper
     #[arg(long, value_enum)]
     pub paper: Paper,
-    /// What is run: all that the paper has (everything but views) unless stated
+    /// Parts to run; all parts of the paper (everything but views) by default
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     pub part: Vec<Part>,
     /// Volume files or folders, in any format that `brickfield render` reads, instead of the three data sets
@@ -46,9 +46,8 @@ pub struct LamarArgs {
     /// Pixels along a side of the facets of shells
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=i64::from(brickfield::frame::Placement::MOST_FACET_PIXELS)))]
     pub facet_pixels: u32,
-    /// Timed frames of each contestant, which take turns; in the table up to 27 times as many while it is in doubt
-    /// which is faster
-    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    /// Rounds in which contestants take turns, after one that warms up. Fewer than 6 give no interval of 95 %
+    #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..))]
     pub frames: u32,
     /// Backends to compare
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "cpu,wgpu,ash")]
@@ -59,9 +58,9 @@ pub struct LamarArgs {
     /// Backends without which the comparison fails (status 3)
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub require: Vec<BackendKind>,
-    /// Fail (status 4) if something that is claimed does not hold: of pictures, of times, or both
+    /// Fail (status 4) if a claim does not hold: about pictures, about times (a median ratio above 1), or both
     #[arg(long, value_enum, value_name = "CLAIMS", value_delimiter = ',', require_equals = true, num_args = 0.., default_missing_values = ["pictures", "times"])]
-    pub check: Vec<Claim>,
+    pub check: Vec<ClaimKind>,
     /// Folder that receives tables as JSON, and pictures
     #[arg(long, value_name = "DIR", default_value = "target/lamar")]
     pub out: PathBuf,
@@ -80,16 +79,16 @@ pub enum Paper {
     Lamar,
 }
 
-/// What is claimed.
+/// The subject of a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Claim {
-    /// What pictures and cuts are like: the same on every machine.
+pub enum ClaimKind {
+    /// Pictures and cuts: the same on every machine.
     Pictures,
-    /// What is faster.
+    /// Times: which is faster.
     Times,
 }
 
-/// What can be run.
+/// The parts of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Part {
     /// Figures 4 and 5: how many tiles the distance filter selects
@@ -98,7 +97,7 @@ pub enum Part {
     Table,
     /// Section 3.1: subsampling against averaging
     Downsampling,
-    /// Section 3.1: the formula for shared voxels against what is stored
+    /// Section 3.1: the formula for shared voxels against the stored ones
     Memory,
     /// Figure 8 in numbers: a constant field at random cuts, with and without opacity correction
     Seams,
@@ -154,8 +153,8 @@ mod tests {
         let of_the_paper = parse("compare --paper lamar");
         assert_eq!(of_the_paper.parts().len(), Part::value_variants().len() - 1);
         assert!(!of_the_paper.parts().contains(&Part::Views) && of_the_paper.check.is_empty());
-        assert_eq!(parse("compare --paper lamar --check --frames 1").check, [Claim::Pictures, Claim::Times]);
-        assert_eq!(parse("compare --paper lamar --check=pictures").check, [Claim::Pictures]);
+        assert_eq!(parse("compare --paper lamar --check --frames 1").check, [ClaimKind::Pictures, ClaimKind::Times]);
+        assert_eq!(parse("compare --paper lamar --check=pictures").check, [ClaimKind::Pictures]);
         assert_eq!(parse("compare a.nrrd --paper lamar b.vti").files.len(), 2);
         assert!(LamarArgs::try_parse_from("compare --paper lamar a.nrrd --only engine".split_whitespace()).is_err());
         let some = parse("compare --paper lamar --part views,seams,views");

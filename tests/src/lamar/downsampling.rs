@@ -1,37 +1,37 @@
-//! Section 3.1: the paper found subsampling better than averaging on its data. What holds on ours.
+//! Section 3.1: the paper found subsampling better than averaging on its data. This part repeats the comparison on ours.
 
 use brickfield::bricks::Downsampling;
-use brickfield::frame::Backend;
 use brickfield_core::BrickSide;
 
-use super::measure::{Contestant, answer, distance};
-use super::scenes::{exhibits, geometries, scene, tree, views};
+use super::measure::{answer, distance};
+use super::scenes::{data_sets, geometries, scene, tree, views};
 use super::{LamarArgs, LamarError, Missed, print};
+use crate::turns::Contestant;
 
 pub(super) fn run(args: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
     print("Bricks of 16, ray caster on the cpu, errors against the continuous integral at full resolution.\n")?;
     print("data               view      RMSE: subsampled  averaged   colour difference: subsampled  averaged  better")?;
     let mut cpu = brickfield::cpu::CpuBackend::new();
     let mut n_won = [0, 0];
-    for exhibit in exhibits(args)? {
-        let exhibit = exhibit?;
+    for data_set in data_sets(args)? {
+        let data_set = data_set?;
         let trees =
-            [Downsampling::Subsample, Downsampling::Average].map(|how| tree(&exhibit.volume, BrickSide::S16, how));
+            [Downsampling::Subsample, Downsampling::Average].map(|how| tree(&data_set.volume, BrickSide::S16, how));
         let [subsampled, averaged] = trees;
         let trees = [subsampled?, averaged?];
-        for (view, camera) in views(&exhibit, args.size)? {
-            let scene = scene(args, &exhibit.transfer, camera, geometries(args)[3], &args.detail);
-            let answer = answer(&exhibit.volume, &scene);
+        for (view, camera) in views(&data_set, args.size)? {
+            let scene = scene(args, &data_set.transfer, camera, geometries(args)[3], &args.detail);
+            let answer = answer(&data_set.volume, &scene);
             let mut errors = Vec::new();
             for tree in &trees {
-                let (image, _) = Contestant::new(tree, &scene).frame(&mut cpu as &mut dyn Backend)?;
-                errors.push(distance(&image, &answer)?);
+                let frame = Contestant::new(tree, scene.clone()).frame(&mut cpu)?;
+                errors.push(distance(&frame.image, &answer)?);
             }
             let winner = usize::from(errors[1].rmse < errors[0].rmse);
             n_won[winner] += 1;
             print(&format!(
                 "{:<18} {:<9} {:>16.3e} {:>9.3e} {:>30.2} {:>9.2}  {}",
-                exhibit.name,
+                data_set.name,
                 view,
                 errors[0].rmse,
                 errors[1].rmse,

@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::compare::CompareError;
+use crate::turns::FrameError;
 
 /// Why a part could not be run.
 #[derive(Debug, thiserror::Error)]
@@ -45,6 +46,15 @@ pub enum LamarError {
 impl From<CompareError> for LamarError {
     fn from(e: CompareError) -> LamarError {
         LamarError::Backends(Box::new(e))
+    }
+}
+
+impl From<FrameError> for LamarError {
+    fn from(e: FrameError) -> LamarError {
+        match e {
+            FrameError::Prepare(e) => LamarError::Prepare(e),
+            FrameError::Render { backend, source } => LamarError::Render { backend, source },
+        }
     }
 }
 

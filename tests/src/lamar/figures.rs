@@ -8,7 +8,7 @@ use brickfield::{Residency, Scene, Viewpoint, prepare, write_exr, write_png};
 use brickfield_core::glam::UVec2;
 use brickfield_core::{BrickId, BrickSide, Camera, Image};
 
-use super::scenes::{Exhibit, Geometry, exhibits, geometries, geometries_of, scene, tree, views};
+use super::scenes::{DataSet, Geometry, data_sets, geometries, geometries_of, scene, tree, views};
 use super::seams::{camera as cube_camera, cube};
 use super::{LamarArgs, LamarError, Missed, print};
 use crate::compare::rivals::Rivals;
@@ -24,8 +24,8 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
     // The last is a rasteriser, if there is one.
     let Some(backend) = rivals.present.last_mut() else { return Ok(Vec::new()) };
     figure_8(args, backend.as_mut())?;
-    for exhibit in exhibits(args)? {
-        figure_14(args, backend.as_mut(), &exhibit?)?;
+    for data_set in data_sets(args)? {
+        figure_14(args, backend.as_mut(), &data_set?)?;
     }
     Ok(Vec::new())
 }
@@ -50,25 +50,25 @@ fn figure_8(args: &LamarArgs, backend: &mut dyn Backend) -> Result<(), LamarErro
 }
 
 /// From the surface and from inside: the bricks and the picture, with fixed tiles and with multiresolution.
-fn figure_14(args: &LamarArgs, backend: &mut dyn Backend, exhibit: &Exhibit) -> Result<(), LamarError> {
-    let tree = tree(&exhibit.volume, SIDE, Downsampling::Subsample)?;
+fn figure_14(args: &LamarArgs, backend: &mut dyn Backend, data_set: &DataSet) -> Result<(), LamarError> {
+    let tree = tree(&data_set.volume, SIDE, Downsampling::Subsample)?;
     // Beside the line of the views, so that cameras are seen from their sides.
     let overview: Viewpoint = "from=-1,-0.4,0.5 zoom=0.8".parse().expect("a viewpoint");
-    let overview = overview.camera(exhibit.volume.grid(), exhibit.frame, args.size)?;
+    let overview = overview.camera(data_set.volume.grid(), data_set.frame, args.size)?;
     let mut rows = Vec::new();
-    for (_, camera) in views(exhibit, args.size)?.into_iter().skip(1) {
+    for (_, camera) in views(data_set, args.size)?.into_iter().skip(1) {
         let mut panels = Vec::new();
         // Distances of the paper's own factor.
         for criterion in [Criterion::FullResolution, Criterion::Distance { factor: 1.0 }] {
             let detail = [criterion];
-            let scene = scene(args, &exhibit.transfer, camera, geometries(args)[3], &detail);
+            let scene = scene(args, &data_set.transfer, camera, geometries(args)[3], &detail);
             let (picture, bricks) = render(&tree, &scene, backend)?;
             panels.extend([boxes(&tree, &overview, &camera, &bricks, args.size), picture]);
         }
         rows.push(beside(&panels));
     }
     let name =
-        exhibit.name.rsplit('/').next().unwrap_or(&exhibit.name).split('.').next().unwrap_or_default().to_owned();
+        data_set.name.rsplit('/').next().unwrap_or(&data_set.name).split('.').next().unwrap_or_default().to_owned();
     let what = "from the surface, from inside; fixed tiles and their picture, multiresolution and its picture";
     write(args, &format!("figure14-{name}"), &stacked(&rows), what)
 }

@@ -1,11 +1,8 @@
 //! Frames: how long, how far from the answer, and whether as the plan says.
 
-use std::ops::RangeInclusive;
-use std::time::Instant;
-
 use brickfield::bricks::BrickTree;
 use brickfield::cpu::{ContinuousOptions, Discrete, continuous, discrete};
-use brickfield::frame::{Backend, Feature, RenderError};
+use brickfield::frame::{Backend, Feature, FramePlan};
 use brickfield::{Residency, Scene, Skipping, Technique, prepare};
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Aabb, Image, Volume};
@@ -13,18 +10,10 @@ use serde::Serialize;
 
 use super::LamarError;
 use crate::conformance::Tolerance;
-use crate::metrics::{delta_e, errors, median};
+use crate::metrics::{delta_e, errors};
+use crate::turns::{Contestant, Ratio, Spread, TimedFrame, take_turns};
 
-/// Milliseconds over frames.
-#[derive(Clone, Copy, Debug, Serialize)]
-#[allow(missing_docs)]
-pub(super) struct Spread {
-    pub(super) median: f64,
-    pub(super) min: f64,
-    pub(super) max: f64,
-}
-
-/// What a frame draws. Frames of one scene, one of them of level 0 alone, draw the same bricks if these are equal.
+/// The bricks and polygons of a frame. Frames of one scene, one of them of level 0 alone, draw the same bricks if these are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(super) struct Drawn {
     pub(super) n_bricks: usize,
@@ -42,7 +31,7 @@ pub(super) struct Distance {
     pub(super) delta_e_mean: f64,
 }
 
-/// The continuous integral at full resolution: what everything is held against.
+/// The continuous integral at full resolution: the answer to which every picture is held.
 pub(super) fn answer(volume: &Volume, scene: &Scene) -> Image<f64> {
     let options = ContinuousOptions { tolerance: 1e-7, transmittance_floor: 1e-9 };
     let everywhere = Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY };
@@ -55,18 +44,16 @@ pub(super) fn reference(tree: &BrickTree, scene: &Scene) -> Result<Discrete, Lam
     Ok(discrete(&prepare(tree, &complete, &mut Residency::default())?))
 }
 
-/// Two scenes of one tree on one backend, which take turns.
+/// Two scenes of one tree on one backend, which took turns.
 pub(super) struct Duel {
-    pub(super) first: Outcome,
-    pub(super) second: Outcome,
-    /// The first's time over the second's: median over the rounds.
-    pub(super) ratio: f64,
-    /// Rounds, of one frame of each.
-    pub(super) n_rounds: usize,
+    pub(super) first: SceneTimes,
+    pub(super) second: SceneTimes,
+    /// The first's time over the second's.
+    pub(super) ratio: Ratio,
 }
 
-/// One of them.
-pub(super) struct Outcome {
+/// One of two scenes.
+pub(super) struct SceneTimes {
     pub(super) image: Image<f32>,
     pub(super) drawn: Drawn,
     /// Whole frames.
@@ -75,103 +62,41 @@ pub(super) struct Outcome {
     pub(super) prepare_ms: Spread,
 }
 
-/// At least so many rounds, and on to so many while it is in doubt which is faster.
+/// Times two scenes of a tree in so many rounds, at least one.
 pub(super) fn duel(
     tree: &BrickTree,
     scenes: &[Scene; 2],
     backend: &mut dyn Backend,
-    rounds: RangeInclusive<u32>,
+    n_rounds: u32,
 ) -> Result<Duel, LamarError> {
-    let [mut first, mut second] = [0, 1].map(|i| Contestant::new(tree, &scenes[i]));
-    let mut ratios = Vec::new();
-    first.warm_up(backend)?;
-    loop {
-        let (a, b) = match ratios.len() % 2 {
-            0 => round(&mut first, &mut second, backend)?,
-            _ => {
-                let (b, a) = round(&mut second, &mut first, backend)?;
-                (a, b)
-            }
-        };
-        ratios.push(first.ms[ratios.len()] / second.ms[ratios.len()]);
-        let n = ratios.len() as u32;
-        // Of the same bricks neither is faster.
-        let is_open = a.1 != b.1 && in_doubt(&ratios);
-        if n >= *rounds.start() && (n >= *rounds.end() || !is_open) {
-            let (ratio, n_rounds) = (median(ratios.clone()), ratios.len());
-            return Ok(Duel { first: first.outcome(a), second: second.outcome(b), ratio, n_rounds });
+    let mut contestants = scenes.each_ref().map(|scene| Contestant::new(tree, scene.clone()));
+    let (mut latest, mut prepare_ms) = ([None, None], [Vec::new(), Vec::new()]);
+    let ms = take_turns::<LamarError>(2, n_rounds, |turn| {
+        let frame = contestants[turn.contestant].take(turn, backend)?;
+        if !turn.warm_up {
+            prepare_ms[turn.contestant].push(frame.prepare_ms);
         }
-    }
+        let frame_ms = frame.ms;
+        latest[turn.contestant] = Some(frame);
+        Ok(frame_ms)
+    })?;
+    let times = |frame: Option<TimedFrame>, i: usize| {
+        let TimedFrame { image, plan, .. } = frame.expect("every contestant has had its turn");
+        let (ms, prepare_ms) = (Spread::of(&ms[i]), Spread::of(&prepare_ms[i]));
+        SceneTimes { image, drawn: Drawn::of(&plan), ms, prepare_ms }
+    };
+    let [first, second] = latest;
+    Ok(Duel { first: times(first, 0), second: times(second, 1), ratio: Ratio::of(&ms[0], &ms[1]) })
 }
 
-/// A timed frame of each. Who begins drew the frame before, so only the other has bricks to bring.
-fn round(
-    begins: &mut Contestant,
-    ends: &mut Contestant,
-    backend: &mut dyn Backend,
-) -> Result<(Picture, Picture), LamarError> {
-    let begun = begins.frame(backend)?;
-    ends.warm_up(backend)?;
-    Ok((begun, ends.frame(backend)?))
-}
-
-/// A few rounds of one mind do if their median ratio is as far from 1 as this.
-const BY_FAR: f64 = 4.0 / 3.0;
-/// Else one must lead by so many standard deviations of a fair coin's tosses.
-const DEVIATIONS: f64 = 3.0;
-
-/// Whether rounds of these ratios leave open who is faster: on a busy machine a round may say what the next denies.
-fn in_doubt(ratios: &[f64]) -> bool {
-    let n_above = ratios.iter().filter(|ratio| **ratio > 1.0).count();
-    let lead = n_above.abs_diff(ratios.len() - n_above);
-    let ratio = median(ratios.to_vec());
-    let is_clear = lead == ratios.len() && ratio.max(1.0 / ratio) >= BY_FAR;
-    !is_clear && (lead as f64) < DEVIATIONS * (ratios.len() as f64).sqrt()
-}
-
-/// A frame's picture, and what it draws.
-type Picture = (Image<f32>, Drawn);
-
-/// One scene on one backend.
-pub(super) struct Contestant<'a> {
-    tree: &'a BrickTree,
-    scene: &'a Scene,
-    residency: Residency,
-    ms: Vec<f64>,
-    prepare_ms: Vec<f64>,
-}
-
-impl<'a> Contestant<'a> {
-    pub(super) fn new(tree: &'a BrickTree, scene: &'a Scene) -> Contestant<'a> {
-        Contestant { tree, scene, residency: Residency::default(), ms: Vec::new(), prepare_ms: Vec::new() }
-    }
-
-    /// A frame that is not timed: it brings the bricks.
-    fn warm_up(&mut self, backend: &mut dyn Backend) -> Result<(), LamarError> {
-        let plan = prepare(self.tree, self.scene, &mut self.residency)?;
-        backend.render(&plan).map_err(failed(backend))?;
-        Ok(())
-    }
-
-    /// A frame from the scene to the picture in memory, selection, order and polygons included. Its bricks are resident if the
-    /// backend's frame before was this contestant's, too.
-    pub(super) fn frame(&mut self, backend: &mut dyn Backend) -> Result<Picture, LamarError> {
-        let begin = Instant::now();
-        let plan = prepare(self.tree, self.scene, &mut self.residency)?;
-        self.prepare_ms.push(begin.elapsed().as_secs_f64() * 1e3);
-        let image = backend.render(&plan).map_err(failed(backend))?.image;
-        self.ms.push(begin.elapsed().as_secs_f64() * 1e3);
-        let drawn = Drawn {
+impl Drawn {
+    fn of(plan: &FramePlan) -> Drawn {
+        Drawn {
             n_bricks: plan.bricks.n_bricks() as usize,
             n_bytes: plan.bricks.bytes().len(),
             n_polygons: plan.proxy.as_ref().map_or(0, |proxy| proxy.n_polygons()),
             has_coarse: plan.features.contains(Feature::MultiLevel),
-        };
-        Ok((image, drawn))
-    }
-
-    fn outcome(self, (image, drawn): Picture) -> Outcome {
-        Outcome { image, drawn, ms: spread(&self.ms), prepare_ms: spread(&self.prepare_ms) }
+        }
     }
 }
 
@@ -194,17 +119,6 @@ impl Judge {
     pub(super) fn complaint(&self, image: &Image<f32>) -> Option<String> {
         self.tolerance.judge(image, &self.reference.image).complaint.map(|c| c.to_string())
     }
-}
-
-/// What a backend's failure becomes.
-fn failed(backend: &dyn Backend) -> impl FnOnce(RenderError) -> LamarError + use<> {
-    let name = backend.describe().backend;
-    move |source| LamarError::Render { backend: name, source }
-}
-
-fn spread(ms: &[f64]) -> Spread {
-    let (min, max) = ms.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
-    Spread { median: median(ms.to_vec()), min, max }
 }
 
 pub(super) fn distance(image: &Image<f32>, answer: &Image<f64>) -> Result<Distance, LamarError> {
@@ -237,24 +151,9 @@ mod tests {
         let drawn = |level| {
             let detail = vec![Criterion::Uniform(Level(level))];
             let scene = Scene { detail, ..Scene::new(camera, UVec2::splat(8), transfer.clone()) };
-            Contestant::new(&tree, &scene).frame(&mut CpuBackend::new()).unwrap().1
+            Drawn::of(&Contestant::new(&tree, scene).frame(&mut CpuBackend::new()).unwrap().plan)
         };
         assert_eq!((drawn(0).n_bricks, drawn(1).n_bricks), (1, 1));
         assert!(drawn(0) == drawn(0) && drawn(0) != drawn(1));
-    }
-
-    #[test]
-    fn who_is_faster_is_open_while_it_is_close_or_rounds_disagree() {
-        // By far, and of one mind.
-        assert!(!in_doubt(&[1.2, 2.0, 1.5]) && !in_doubt(&[0.5, 0.6, 0.8]));
-        assert!(in_doubt(&[1.1, 1.2, 1.3]) && in_doubt(&[0.8, 0.8, 0.9]));
-        // By far, but not of one mind.
-        assert!(in_doubt(&[0.8, 0.7, 0.5, 1.3]) && in_doubt(&[1.3, 1.4, 1.6, 0.9]));
-        // By little, but again and again.
-        assert!(in_doubt(&[1.01; 8]) && in_doubt(&[0.99; 8]));
-        assert!(!in_doubt(&[1.01; 9]) && !in_doubt(&[0.99; 9]));
-        let with_dissent = |n_above, n_below| [vec![1.1; n_above], vec![0.9; n_below]].concat();
-        assert!(in_doubt(&with_dissent(30, 12)) && in_doubt(&with_dissent(12, 30)));
-        assert!(!in_doubt(&with_dissent(31, 11)) && !in_doubt(&with_dissent(11, 31)));
     }
 }

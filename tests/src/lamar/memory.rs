@@ -3,7 +3,7 @@
 use brickfield::bricks::tree_memory;
 use brickfield_core::{BrickLayout, Level};
 
-use super::scenes::{exhibits, sides};
+use super::scenes::{data_sets, sides};
 use super::{LamarArgs, LamarError, Missed, print};
 
 pub(super) fn run(args: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
@@ -14,9 +14,9 @@ pub(super) fn run(args: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
     print(
         "data               side  shared by the formula   bricks  level 0: once  shared  padding   all levels / voxels",
     )?;
-    for exhibit in exhibits(args)? {
-        let exhibit = exhibit?;
-        let (dims, scalar) = (exhibit.volume.grid().dims(), exhibit.volume.scalar_type());
+    for data_set in data_sets(args)? {
+        let data_set = data_set?;
+        let (dims, scalar) = (data_set.volume.grid().dims(), data_set.volume.scalar_type());
         for side in sides(args) {
             let layout = BrickLayout::new(dims, side);
             let memory = tree_memory(&layout, scalar);
@@ -24,7 +24,7 @@ pub(super) fn run(args: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
             let share = |bytes: u64| 100.0 * bytes as f64 / level.stored_bytes as f64;
             print(&format!(
                 "{:<18} {:>4} {:>12.0} ({:>5.2} %) {:>8} {:>13.1} % {:>5.1} % {:>6.1} % {:>21.3}",
-                exhibit.name,
+                data_set.name,
                 side,
                 n.powi(3) - (n - 1.0).powi(3),
                 100.0 * (1.0 - ((n - 1.0) / n).powi(3)),

@@ -1,8 +1,8 @@
-//! LaMar, Hamann and Joy 1999 on this project's data: table 1 with its errors, figures 8 and 14, and what else the paper claims.
+//! LaMar, Hamann and Joy 1999 on this project's data: table 1 with its errors, figures 8 and 14, and the paper's other claims.
 //!
 //! - `selection`: how many tiles the distance filter selects, figures 4 and 5.
 //! - `table`: fixed tiles against multiresolution, three proxy geometries and the ray caster, time and error on every backend.
-//! - `downsampling`: subsampling against averaging. `memory`: the formula for shared voxels against what is stored.
+//! - `downsampling`: subsampling against averaging. `memory`: the formula for shared voxels against the stored ones.
 //! - `seams`: a constant field, with and without opacity correction. `shells`: tessellated shells against spheres.
 //! - `figures`: pictures. `views`: a screen-space error of a pixel, over views of a large volume.
 
@@ -19,39 +19,45 @@ mod shells;
 mod table;
 mod views;
 
-pub use args::{Claim, LamarArgs, Part};
+pub use args::{ClaimKind, LamarArgs, Part};
 pub use error::LamarError;
 
 use crate::compare::rivals::Rivals;
 use crate::compare::say;
+use crate::turns::Claim;
 
-/// What came of the parts that were asked for.
+/// The findings of the parts that were asked for.
 #[derive(Clone, Debug, Default)]
 pub struct Findings {
-    /// What does not hold.
+    /// Claims that do not hold.
     pub missed: Vec<Missed>,
 }
 
 /// A claim that does not hold.
 #[derive(Clone, Debug)]
 pub struct Missed {
-    /// What it is about.
-    pub claim: Claim,
-    /// What does not hold, in words.
+    /// Its subject.
+    pub kind: ClaimKind,
+    /// The claim and the finding, in words.
     pub what: String,
 }
 
 impl Missed {
     fn of_pictures(what: String) -> Missed {
-        Missed { claim: Claim::Pictures, what }
+        Missed { kind: ClaimKind::Pictures, what }
     }
 
     fn of_times(what: String) -> Missed {
-        Missed { claim: Claim::Times, what }
+        Missed { kind: ClaimKind::Times, what }
+    }
+
+    /// A claim about times, if it is missed.
+    fn of_claim(claim: &Claim) -> Option<Missed> {
+        (!claim.kept).then(|| Missed::of_times(claim.to_string()))
     }
 }
 
-/// Runs the parts that `args` ask for, and prints what they find.
+/// Runs the parts that `args` ask for, and prints their findings.
 ///
 /// # Errors
 /// Data or a folder that cannot be had, a scene that is refused, a backend that fails.

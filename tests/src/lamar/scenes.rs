@@ -17,7 +17,7 @@ use super::{LamarArgs, LamarError, Part};
 const DATA: [&str; 3] = ["ct/engine.vti", "ct/aneurism.vti", "ct/LIDC2.mha"];
 
 /// A volume with its transfer function.
-pub(super) struct Exhibit {
+pub(super) struct DataSet {
     pub(super) name: String,
     pub(super) volume: Volume,
     pub(super) transfer: TransferFunction,
@@ -45,8 +45,8 @@ pub(super) fn check_data(args: &LamarArgs) -> Result<(), LamarError> {
 }
 
 /// The volumes that are asked for, one by one.
-pub(super) fn exhibits(args: &LamarArgs) -> Result<impl Iterator<Item = Result<Exhibit, LamarError>>, LamarError> {
-    Ok(named(args)?.into_iter().map(|(name, path)| exhibit(name, &path)))
+pub(super) fn data_sets(args: &LamarArgs) -> Result<impl Iterator<Item = Result<DataSet, LamarError>>, LamarError> {
+    Ok(named(args)?.into_iter().map(|(name, path)| data_set(name, &path)))
 }
 
 /// The volumes that are asked for: what the tables call them, and where they are.
@@ -67,10 +67,10 @@ fn named(args: &LamarArgs) -> Result<Vec<(String, PathBuf)>, LamarError> {
     }
 }
 
-fn exhibit(name: String, path: &Path) -> Result<Exhibit, LamarError> {
+fn data_set(name: String, path: &Path) -> Result<DataSet, LamarError> {
     let opened = open(path, &Limits::default())?;
     let transfer = automatic(&opened.volume);
-    Ok(Exhibit { name, transfer, frame: opened.frame, volume: opened.volume })
+    Ok(DataSet { name, transfer, frame: opened.frame, volume: opened.volume })
 }
 
 /// The brick sides that are asked for.
@@ -84,9 +84,9 @@ pub(super) fn tree(volume: &Volume, side: BrickSide, downsampling: Downsampling)
 }
 
 /// Three views along one line: from outside, from the box's surface, and from half-way to its centre.
-pub(super) fn views(exhibit: &Exhibit, size: UVec2) -> Result<[(&'static str, Camera); 3], LamarError> {
-    let grid = exhibit.volume.grid();
-    let outside = Viewpoint::default().camera(grid, exhibit.frame, size)?;
+pub(super) fn views(data_set: &DataSet, size: UVec2) -> Result<[(&'static str, Camera); 3], LamarError> {
+    let grid = data_set.volume.grid();
+    let outside = Viewpoint::default().camera(grid, data_set.frame, size)?;
     let center = grid.world_box().center();
     let way = surface_from(grid, center, -outside.forward());
     let wide = Projection::Perspective { fov_y: 70f64.to_radians() };
@@ -124,7 +124,7 @@ pub(super) fn geometries_of(args: &LamarArgs, backend: &dyn Backend) -> impl Ite
     geometries(args).into_iter().filter(move |g| rasterises || g.technique == Technique::RayCasting)
 }
 
-/// A scene of an exhibit.
+/// A scene of an data_set.
 pub(super) fn scene(
     args: &LamarArgs,
     transfer: &TransferFunction,

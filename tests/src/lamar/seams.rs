@@ -119,7 +119,7 @@ fn figure_8(
         let mut found = Vec::new();
         for cut in [None, Some(&several)] {
             let truth = render(tree, &corrected, cut, backend)?;
-            found.push(Ratios::of(&render(tree, &nominal, cut, backend)?, &truth));
+            found.push(DepthRatios::of(&render(tree, &nominal, cut, backend)?, &truth));
         }
         print(&format!("{:<16} {name:<5} {}   {}", geometry.name, found[0], found[1]))?;
         for ratios in found.iter().filter(|ratios| !ratios.are_of(geometry.placement)) {
@@ -155,7 +155,7 @@ fn angles(
                 ..scene(args, fog, camera, geometry, &[Criterion::FullResolution])
             };
             let truth = render(tree, &of(Lengths::True), None, backend.as_mut())?;
-            let mean = Ratios::of(&render(tree, &of(Lengths::Nominal), None, backend.as_mut())?, &truth).mean;
+            let mean = DepthRatios::of(&render(tree, &of(Lengths::Nominal), None, backend.as_mut())?, &truth).mean;
             ratios.push((degrees, mean, degrees.min(90.0 - degrees).to_radians().cos()));
         }
         let name = backend.describe().backend;
@@ -231,7 +231,7 @@ fn closed_form(scene: &Scene, grid: &Grid) -> Image<f64> {
 }
 
 /// Optical depth over true optical depth, of pixels that lie behind enough to tell.
-struct Ratios {
+struct DepthRatios {
     middle: f64,
     rim: f64,
     mean: f64,
@@ -239,7 +239,7 @@ struct Ratios {
     greatest: f64,
 }
 
-impl Ratios {
+impl DepthRatios {
     /// Whether they are what figure 8 shows of a geometry.
     fn are_of(&self, placement: Placement) -> bool {
         match placement {
@@ -253,7 +253,7 @@ impl Ratios {
         }
     }
 
-    fn of(image: &Image<f32>, truth: &Image<f32>) -> Ratios {
+    fn of(image: &Image<f32>, truth: &Image<f32>) -> DepthRatios {
         let size = image.size();
         let is_middle = |i: usize| {
             let at = UVec2::new(i as u32 % size.x, i as u32 / size.x) * 3;
@@ -268,7 +268,7 @@ impl Ratios {
             own.iter().sum::<f64>() / own.len() as f64
         };
         let all = || ratios.iter().map(|(_, r)| *r);
-        Ratios {
+        DepthRatios {
             middle: mean(&|middle| middle),
             rim: mean(&|middle| !middle),
             mean: mean(&|_| true),
@@ -278,9 +278,9 @@ impl Ratios {
     }
 }
 
-impl std::fmt::Display for Ratios {
+impl std::fmt::Display for DepthRatios {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Ratios { middle, rim, least, greatest, .. } = self;
+        let DepthRatios { middle, rim, least, greatest, .. } = self;
         write!(f, "middle {middle:.3}, rim {rim:.3}, {least:.3} to {greatest:.3}")
     }
 }

@@ -7,10 +7,11 @@ use brickfield::lod::Criterion;
 use brickfield_core::{Camera, Image};
 use serde::Serialize;
 
-use super::measure::{Distance, Drawn, Judge, Outcome, Spread, answer, distance, duel};
-use super::scenes::{Exhibit, Geometry, exhibits, geometries, geometries_of, scene, sides, tree, views};
+use super::measure::{Distance, Drawn, Judge, SceneTimes, answer, distance, duel};
+use super::scenes::{DataSet, Geometry, data_sets, geometries, geometries_of, scene, sides, tree, views};
 use super::{LamarArgs, LamarError, Missed, print, write_rows};
 use crate::compare::rivals::Rivals;
+use crate::turns::{Bound, Claim, Claims, Ratio, Spread, Standing};
 
 /// A line of the table: one data set, view, tile size, geometry and backend.
 #[derive(Clone, Debug, Serialize)]
@@ -21,19 +22,18 @@ struct Row {
     side: u32,
     geometry: &'static str,
     backend: &'static str,
-    fixed: Cell,
-    multiresolution: Cell,
-    /// Fixed over multiresolution: the median over rounds in which they took turns.
-    ratio: f64,
-    n_rounds: usize,
+    fixed: Tiling,
+    multiresolution: Tiling,
+    /// The time of fixed tiles over that of multiresolution.
+    ratio: Ratio,
 }
 
-/// One way of drawing.
+/// One way of drawing: fixed tiles, or multiresolution.
 #[derive(Clone, Debug, Serialize)]
-struct Cell {
+struct Tiling {
     drawn: Drawn,
     ms: Spread,
-    /// Of those, selection, order and polygons.
+    /// The part of it for selection, order and polygons.
     prepare_ms: Spread,
     error: Distance,
     /// Why the picture is not within the rule of its own cut's f64 reference.
@@ -42,7 +42,7 @@ struct Cell {
 
 /// One tree seen from one place.
 struct Seat<'a> {
-    exhibit: &'a Exhibit,
+    data_set: &'a DataSet,
     tree: &'a BrickTree,
     camera: Camera,
     view: &'static str,
@@ -52,39 +52,43 @@ struct Seat<'a> {
 
 pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, LamarError> {
     print(&format!(
-        "{} x {} pixels, steps of {} voxel(s) of level 0, 2^level of them in coarser bricks (subsampled); times are medians of {} frames or more from\n\
-         the scene to the picture (selection, order and polygons included, bricks resident), the ratio is that of rounds in which both took turns; errors are against the continuous integral\n\
-         at full resolution; \"ok\": within the rule of the f64 sum of the same cut, nothing culled.\n",
+        "{} x {} pixels, steps of {} voxel(s) of level 0, 2^level of them in coarser bricks (subsampled); times are medians of {} rounds in which both took turns,\n\
+         from the scene to the picture (selection, order and polygons included, bricks resident); the ratio is the median of the rounds' ratios, with the interval that\n\
+         holds the true one and its confidence; \"undecided\": the interval holds 1, or has less than 95 %. Errors are against the continuous integral at full resolution;\n\
+         \"ok\": within the rule of the f64 sum of the same cut, nothing culled.\n",
         args.size.x, args.size.y, args.step, args.frames
     ))?;
     print(HEADER)?;
     let mut rows = Vec::new();
-    for exhibit in exhibits(args)? {
-        let exhibit = exhibit?;
-        let views = views(&exhibit, args.size)?;
+    for data_set in data_sets(args)? {
+        let data_set = data_set?;
+        let views = views(&data_set, args.size)?;
         let full = geometries(args)[3];
         let answers =
-            views.map(|(_, camera)| answer(&exhibit.volume, &scene(args, &exhibit.transfer, camera, full, &[])));
+            views.map(|(_, camera)| answer(&data_set.volume, &scene(args, &data_set.transfer, camera, full, &[])));
         for side in sides(args) {
-            let tree = tree(&exhibit.volume, side, Downsampling::Subsample)?;
+            let tree = tree(&data_set.volume, side, Downsampling::Subsample)?;
             for ((view, camera), answer) in views.into_iter().zip(&answers) {
-                let seat = Seat { exhibit: &exhibit, tree: &tree, camera, view, side: side.n_samples(), answer };
+                let seat = Seat { data_set: &data_set, tree: &tree, camera, view, side: side.n_samples(), answer };
                 rows.extend(of_seat(args, rivals, &seat)?);
             }
         }
     }
     write_rows(args, "table.json", &rows)?;
-    Ok(missed(&rows))
+    let claims = claims(&rows);
+    print(&format!("\n{}", Claims(&claims)))?;
+    write_rows(args, "table-claims.json", &claims)?;
+    Ok(missed(&rows, &claims))
 }
 
 const HEADER: &str = "\
-data               view     side  tiles: fixed multi  geometry        backend  fixed ms (min to max)      multi ms (min to max)      ratio  \
+data               view     side  tiles: fixed multi  geometry        backend  fixed ms (min to max)      multi ms (min to max)      fixed / multi              multi is   \
 RMSE: fixed    multi  max: fixed    multi  as the cut says";
 
 fn of_seat(args: &LamarArgs, rivals: &mut Rivals, seat: &Seat<'_>) -> Result<Vec<Row>, LamarError> {
     let mut rows = Vec::new();
     for geometry in geometries(args) {
-        let with = |detail: &[Criterion]| scene(args, &seat.exhibit.transfer, seat.camera, geometry, detail);
+        let with = |detail: &[Criterion]| scene(args, &seat.data_set.transfer, seat.camera, geometry, detail);
         let scenes = [with(&[Criterion::FullResolution]), with(&args.detail)];
         let draws = |backend: &dyn Backend| geometries_of(args, backend).any(|own| own == geometry);
         let Some(any) = rivals.present.iter().find(|backend| draws(backend.as_ref())) else { continue };
@@ -99,9 +103,6 @@ fn of_seat(args: &LamarArgs, rivals: &mut Rivals, seat: &Seat<'_>) -> Result<Vec
     Ok(rows)
 }
 
-/// Most rounds of a row in which it stays in doubt which is faster, for each that is asked for.
-const MOST_ROUNDS: u32 = 27;
-
 /// Fixed and multiresolution take turns.
 fn contest(
     args: &LamarArgs,
@@ -110,31 +111,30 @@ fn contest(
     geometry: Geometry,
     (scenes, judges): (&[Scene; 2], &[Judge; 2]),
 ) -> Result<Row, LamarError> {
-    let duel = duel(seat.tree, scenes, backend, args.frames..=args.frames.saturating_mul(MOST_ROUNDS))?;
-    let cell = |outcome: Outcome, judge: &Judge| -> Result<Cell, LamarError> {
-        let (error, complaint) = (distance(&outcome.image, seat.answer)?, judge.complaint(&outcome.image));
-        let Outcome { drawn, ms, prepare_ms, .. } = outcome;
-        Ok(Cell { drawn, ms, prepare_ms, error, complaint })
+    let duel = duel(seat.tree, scenes, backend, args.frames)?;
+    let tiling = |times: SceneTimes, judge: &Judge| -> Result<Tiling, LamarError> {
+        let (error, complaint) = (distance(&times.image, seat.answer)?, judge.complaint(&times.image));
+        let SceneTimes { drawn, ms, prepare_ms, .. } = times;
+        Ok(Tiling { drawn, ms, prepare_ms, error, complaint })
     };
     Ok(Row {
-        data: seat.exhibit.name.clone(),
-        dims: seat.exhibit.volume.grid().dims().to_array(),
+        data: seat.data_set.name.clone(),
+        dims: seat.data_set.volume.grid().dims().to_array(),
         view: seat.view,
         side: seat.side,
         geometry: geometry.name,
         backend: backend.describe().backend,
-        fixed: cell(duel.first, &judges[0])?,
-        multiresolution: cell(duel.second, &judges[1])?,
+        fixed: tiling(duel.first, &judges[0])?,
+        multiresolution: tiling(duel.second, &judges[1])?,
         ratio: duel.ratio,
-        n_rounds: duel.n_rounds,
     })
 }
 
 fn line(row: &Row) -> String {
     let ms = |s: &Spread| format!("{:>7.1} ({:.1} to {:.1})", s.median, s.min, s.max);
-    let verdict = |c: &Cell| c.complaint.as_deref().unwrap_or("ok").to_owned();
+    let verdict = |c: &Tiling| c.complaint.as_deref().unwrap_or("ok").to_owned();
     format!(
-        "{:<18} {:<8} {:>4} {:>12} {:>5}  {:<15} {:<7} {:<26} {:<26} {:>5.2}  {:>10.2e} {:>8.2e} {:>11.2e} {:>8.2e}  {}, {}",
+        "{:<18} {:<8} {:>4} {:>12} {:>5}  {:<15} {:<7} {:<26} {:<26} {:<26} {:<9} {:>11.2e} {:>8.2e} {:>11.2e} {:>8.2e}  {}, {}",
         row.data,
         row.view,
         row.side,
@@ -144,7 +144,8 @@ fn line(row: &Row) -> String {
         row.backend,
         ms(&row.fixed.ms),
         ms(&row.multiresolution.ms),
-        row.ratio,
+        row.ratio.to_string(),
+        words(&row.ratio),
         row.fixed.error.rmse,
         row.multiresolution.error.rmse,
         row.fixed.error.max,
@@ -154,19 +155,35 @@ fn line(row: &Row) -> String {
     )
 }
 
-/// What the paper claims and a row does not show.
-fn missed(rows: &[Row]) -> Vec<Missed> {
-    let name = |r: &Row| format!("{}, {}, {}^3, {}, {}", r.data, r.view, r.side, r.geometry, r.backend);
-    let wrong = |r: &Row| r.fixed.complaint.clone().or_else(|| r.multiresolution.complaint.clone());
-    let not_faster = rows.iter().filter(|r| r.view != "outside").filter_map(|r| {
-        let Row { fixed, multiresolution, ratio, n_rounds, .. } = r;
-        match fixed.drawn == multiresolution.drawn {
-            true => Some(format!("{}: the same bricks both ways, {} of them", name(r), fixed.drawn.n_bricks)),
-            false if *ratio <= 1.0 => Some(format!("{}: {ratio:.2} times as fast over {n_rounds} rounds", name(r))),
-            false => None,
-        }
+/// Which is faster, in a word.
+fn words(ratio: &Ratio) -> &'static str {
+    match ratio.standing(1.0) {
+        Standing::Above => "faster",
+        Standing::Below => "slower",
+        Standing::Undecided => "undecided",
+    }
+}
+
+/// The paper's claim: from near, multiresolution is faster. Where both draw the same bricks, there is nothing to gain.
+fn claims(rows: &[Row]) -> Vec<Claim> {
+    let near = rows.iter().filter(|row| row.view != "outside" && row.fixed.drawn != row.multiresolution.drawn);
+    let claim = |row: &Row| Claim::of_ratio(format!("{}: fixed / multi", name(row)), row.ratio, Bound::Above(1.0));
+    near.map(claim).collect()
+}
+
+fn name(row: &Row) -> String {
+    format!("{}, {}, {}^3, {}, {}", row.data, row.view, row.side, row.geometry, row.backend)
+}
+
+/// The claims that do not hold: about times, about bricks, about pictures.
+fn missed(rows: &[Row], claims: &[Claim]) -> Vec<Missed> {
+    let of_times = claims.iter().filter_map(Missed::of_claim);
+    let alike = rows.iter().filter(|row| row.view != "outside" && row.fixed.drawn == row.multiresolution.drawn);
+    let alike =
+        alike.map(|row| format!("{}: the same bricks both ways, {} of them", name(row), row.fixed.drawn.n_bricks));
+    let wrong = rows.iter().filter_map(|row| {
+        let why = row.fixed.complaint.as_ref().or(row.multiresolution.complaint.as_ref())?;
+        Some(format!("{}: {why}", name(row)))
     });
-    let wrong = rows.iter().filter_map(|r| wrong(r).map(|why| format!("{}: {why}", name(r))));
-    let (not_faster, wrong) = (not_faster.map(Missed::of_times), wrong.map(Missed::of_pictures));
-    not_faster.chain(wrong).collect()
+    of_times.chain(alike.map(Missed::of_times)).chain(wrong.map(Missed::of_pictures)).collect()
 }

@@ -28,9 +28,9 @@ pub(super) fn cases() -> Vec<Case> {
 fn function(
     name: impl Into<String>,
     mutants: Vec<Mutant>,
-    plan: impl Fn() -> FramePlan + 'static,
+    plan: impl Fn() -> FramePlan + Send + Sync + 'static,
     function: ShaderFunction,
-    points: impl Fn(&FramePlan) -> Vec<Point> + 'static,
+    points: impl Fn(&FramePlan) -> Vec<Point> + Send + Sync + 'static,
 ) -> Case {
     let test = move || {
         let plan = plan();
@@ -225,7 +225,7 @@ fn sample_points(plan: &FramePlan) -> Vec<Point> {
     let samples = (0..12u32).map(|i| (DVec3::new(1.0, 2.0, 3.0) * f64::from(i)).min(last));
     let point = |q: DVec3| {
         let input = q.as_vec3();
-        let value = PlanSamples(plan).cell(input.as_dvec3()).map(|c| c.value());
+        let value = PlanSamples(plan).around(input.as_dvec3()).map(|c| c.value());
         let (expected, tolerance) = (value.unwrap_or(0.0), 4e-6 * range);
         Point {
             input: [input.x, input.y, input.z, 0.0],

@@ -31,3 +31,17 @@ pub fn all() -> Vec<Case> {
     .flatten()
     .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    #[test]
+    fn no_two_cases_have_one_name() {
+        let mut names = HashSet::new();
+        let twice: Vec<String> = all().into_iter().map(|case| case.name).filter(|n| !names.insert(n.clone())).collect();
+        assert_eq!(twice, [""; 0]);
+    }
+}

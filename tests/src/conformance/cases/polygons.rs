@@ -32,7 +32,11 @@ fn polygons(volume: Volume, transfer: TransferFunction, placement: Placement) ->
     })
 }
 
-fn each(name: &str, mutants: Vec<Mutant>, setup: impl Fn(Placement) -> Setup + Clone + 'static) -> Vec<Case> {
+fn each(
+    name: &str,
+    mutants: Vec<Mutant>,
+    setup: impl Fn(Placement) -> Setup + Clone + Send + Sync + 'static,
+) -> Vec<Case> {
     let case = |placement: Placement| {
         let setup = setup.clone();
         picture(format!("polygons/{name}-{}", placement.name()), mutants.clone(), move || setup(placement))

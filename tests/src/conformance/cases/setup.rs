@@ -7,7 +7,7 @@ use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Aabb, BrickSide, Camera, Projection, ScalarType, TransferFunction, Volume};
 use brickfield_optics::QuadratureRule;
 
-use super::super::case::{Case, Check, Mutant, NoData, Oracle, Shows, Subject};
+use super::super::case::{Case, Check, Mutant, NoData, Oracle, PictureTest, Shows};
 
 /// A scene in the making.
 pub(super) struct Setup {
@@ -121,7 +121,7 @@ impl Setup {
     }
 
     /// The subject: builds the octree.
-    pub(super) fn build(self) -> Subject {
+    pub(super) fn build(self) -> PictureTest {
         let options = BuildOptions { side: self.side, downsampling: self.downsampling, max_bytes: None };
         let tree = build_tree(&self.volume, &options).expect("a case's octree fits");
         let volume = Box::new(self.volume);
@@ -131,12 +131,16 @@ impl Setup {
             OracleKind::None => Oracle::None,
         };
         let Setup { scene, shows, triangles_at_a_time, .. } = self;
-        Subject { tree, scene, oracle, shows, triangles_at_a_time }
+        PictureTest { tree, scene, oracle, shows, triangles_at_a_time }
     }
 }
 
 /// A picture case.
-pub(super) fn picture(name: impl Into<String>, mutants: Vec<Mutant>, setup: impl Fn() -> Setup + 'static) -> Case {
+pub(super) fn picture(
+    name: impl Into<String>,
+    mutants: Vec<Mutant>,
+    setup: impl Fn() -> Setup + Send + Sync + 'static,
+) -> Case {
     fallible_picture(name, mutants, move || Ok(setup()))
 }
 
@@ -144,7 +148,7 @@ pub(super) fn picture(name: impl Into<String>, mutants: Vec<Mutant>, setup: impl
 pub(super) fn fallible_picture(
     name: impl Into<String>,
     mutants: Vec<Mutant>,
-    setup: impl Fn() -> Result<Setup, NoData> + 'static,
+    setup: impl Fn() -> Result<Setup, NoData> + Send + Sync + 'static,
 ) -> Case {
     let check = Check::Picture(Box::new(move || Ok(setup()?.build())));
     Case { name: name.into(), check, mutants }

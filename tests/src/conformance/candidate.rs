@@ -7,30 +7,30 @@ use brickfield_shaders::ShaderLibrary;
 
 use super::case::Mutant;
 
-/// A backend on an adapter, or why there is none.
-pub struct Contestant {
+/// A backend on an adapter, or the reason of its absence.
+pub struct Candidate {
     kind: BackendKind,
     adapter: Option<String>,
     validation: Validation,
     opened: Result<Box<dyn Backend>, String>,
 }
 
-impl Contestant {
+impl Candidate {
     /// Opens a backend on the adapter that `adapter` is a part of the name of, or on its first.
-    pub fn open(kind: BackendKind, adapter: Option<&str>, validation: Validation) -> Contestant {
+    pub fn open(kind: BackendKind, adapter: Option<&str>, validation: Validation) -> Candidate {
         let adapter = adapter.filter(|_| kind != BackendKind::Cpu);
         let opened = open_backend(kind, adapter, validation).map_err(|e| e.to_string());
-        Contestant { kind, adapter: adapter.map(str::to_owned), validation, opened }
+        Candidate { kind, adapter: adapter.map(str::to_owned), validation, opened }
     }
 
     /// All backends of a kind: one on each adapter, or one absent.
-    pub fn all(kind: BackendKind, adapter: Option<&str>, validation: Validation) -> Vec<Contestant> {
+    pub fn all(kind: BackendKind, adapter: Option<&str>, validation: Validation) -> Vec<Candidate> {
         let status = backends().into_iter().find(|s| s.kind == kind);
         match (adapter, status) {
             (None, Some(BackendStatus { adapters: Ok(adapters), .. })) if adapters.len() > 1 => {
-                adapters.iter().map(|a| Contestant::open(kind, Some(&a.index.to_string()), validation)).collect()
+                adapters.iter().map(|a| Candidate::open(kind, Some(&a.index.to_string()), validation)).collect()
             }
-            _ => vec![Contestant::open(kind, adapter, validation)],
+            _ => vec![Candidate::open(kind, adapter, validation)],
         }
     }
 
@@ -54,7 +54,7 @@ impl Contestant {
         self.opened.as_ref().ok().map(|b| b.describe().adapter.as_str())
     }
 
-    /// What it can do; `None` if it is absent.
+    /// Its capabilities; `None` if it is absent.
     pub fn capabilities(&self) -> Option<Capabilities> {
         self.opened.as_ref().ok().map(|b| b.describe().capabilities)
     }
@@ -80,9 +80,9 @@ impl Contestant {
     }
 
     /// The same backend with other shader sources; `None` for one without shaders.
-    pub fn with_library(&self, library: ShaderLibrary) -> Option<Contestant> {
+    pub fn with_library(&self, library: ShaderLibrary) -> Option<Candidate> {
         let opened = open_patched(self.kind, self.adapter.as_deref(), self.validation, library)?;
-        Some(Contestant { kind: self.kind, adapter: self.adapter.clone(), validation: self.validation, opened })
+        Some(Candidate { kind: self.kind, adapter: self.adapter.clone(), validation: self.validation, opened })
     }
 
     /// Whether a mutant can be run on this backend.

@@ -1,0 +1,77 @@
+//! A scene that a backend renders, from the scene to the picture in memory.
+
+use std::time::Instant;
+
+use brickfield::bricks::BrickTree;
+use brickfield::frame::{Backend, FramePlan, RenderError};
+use brickfield::{PrepareError, Residency, Scene, prepare};
+use brickfield_core::Image;
+
+use super::Turn;
+
+/// A scene of a tree, and the slots of its bricks.
+pub struct Contestant<'a> {
+    tree: &'a BrickTree,
+    scene: Scene,
+    residency: Residency,
+}
+
+/// A frame and its times in milliseconds.
+pub struct TimedFrame {
+    /// The plan that the backend replayed.
+    pub plan: FramePlan,
+    /// The picture.
+    pub image: Image<f32>,
+    /// From the scene to the plan: selection, order, polygons.
+    pub prepare_ms: f64,
+    /// From the scene to the picture.
+    pub ms: f64,
+}
+
+/// Why there is no frame.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum FrameError {
+    #[error(transparent)]
+    Prepare(#[from] PrepareError),
+    #[error("{backend}: {source}")]
+    Render { backend: &'static str, source: RenderError },
+}
+
+impl<'a> Contestant<'a> {
+    /// A scene whose bricks no backend has yet.
+    pub fn new(tree: &'a BrickTree, scene: Scene) -> Contestant<'a> {
+        Contestant { tree, scene, residency: Residency::default() }
+    }
+
+    /// Renders a frame. The bricks are resident if the backend's frame before was this contestant's, too; if not, the time
+    /// includes their upload.
+    ///
+    /// # Errors
+    /// A scene that is refused, a backend that fails.
+    pub fn frame(&mut self, backend: &mut dyn Backend) -> Result<TimedFrame, FrameError> {
+        let begin = Instant::now();
+        let plan = prepare(self.tree, &self.scene, &mut self.residency)?;
+        let prepare_ms = milliseconds_since(begin);
+        let name = backend.describe().backend;
+        let rendered = backend.render(&plan).map_err(|source| FrameError::Render { backend: name, source })?;
+        Ok(TimedFrame { ms: milliseconds_since(begin), plan, image: rendered.image, prepare_ms })
+    }
+
+    /// Takes a turn. The bricks are resident in a timed one: unless the turn before was this contestant's, a frame that is not
+    /// timed brings them.
+    ///
+    /// # Errors
+    /// As [`Contestant::frame`].
+    pub fn take(&mut self, turn: Turn, backend: &mut dyn Backend) -> Result<TimedFrame, FrameError> {
+        if !turn.warm_up && !turn.again {
+            self.frame(backend)?;
+        }
+        self.frame(backend)
+    }
+}
+
+fn milliseconds_since(begin: Instant) -> f64 {
+    begin.elapsed().as_secs_f64() * 1e3
+}
