@@ -164,7 +164,7 @@ fn scenes(exhibit: &Exhibit, side: BrickSide) -> Vec<(String, Scene)> {
     sides.into_iter().chain(more).collect()
 }
 
-/// A round that warms up, in half of the time, then as many timed ones as the share of the rest holds: their number is fixed
+/// A round that warms up, in a third of the time, for a timed one takes twice as long; then as many timed ones as the share of the rest holds: their number is fixed
 /// before the first.
 fn in_turns(
     mut entrants: Vec<Entrant<'_>>,
@@ -172,11 +172,11 @@ fn in_turns(
     (deadline, share): (Deadline, f64),
     left_out: &mut Vec<LeftOut>,
 ) -> Vec<Times> {
-    let (begin, half) = (Instant::now(), deadline.share(0.5));
+    let (begin, third) = (Instant::now(), deadline.share(1.0 / 3.0));
     entrants.retain_mut(|entrant| {
         let warm_up = Turn { contestant: 0, warm_up: true, again: false };
         let what = format!("{}, {}", entrant.what, backends[entrant.backend].0);
-        let taken = half.admit(&what, 0.0).and_then(|()| entrant.take(warm_up, backends));
+        let taken = third.admit(&what, 0.0).and_then(|()| entrant.take(warm_up, backends));
         taken.map_err(|e| left_out.push(e)).is_ok()
     });
     // A timed turn has a frame before it that brings the bricks.

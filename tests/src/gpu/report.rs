@@ -142,6 +142,7 @@ pub struct Times {
 pub struct VolumeInfo {
     /// Along each side.
     pub voxels: u32,
+    /// Next to nothing where an earlier part had made it.
     pub generate_s: f64,
     pub build_s: f64,
     pub volume_bytes: u64,

@@ -90,7 +90,25 @@ fn digits(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+    use std::path::Path;
+
     use super::*;
+
+    /// What README.md shows is what the saved reports say.
+    #[test]
+    fn the_readme_shows_the_saved_reports() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let mut files: Vec<_> =
+            fs::read_dir(root.join("fixtures")).unwrap().map(|entry| entry.unwrap().path()).collect();
+        files.retain(|file| file.file_name().is_some_and(|n| n.to_string_lossy().starts_with("gpu-")));
+        files.sort();
+        let report = |file: &std::path::PathBuf| GpuReport::parse(&fs::read_to_string(file).unwrap()).unwrap();
+        let reports: Vec<GpuReport> = files.iter().map(report).collect();
+        let readme = fs::read_to_string(root.join("README.md")).unwrap();
+        assert!(!reports.is_empty());
+        assert!(readme.contains(&table(&reports)), "README.md must hold this table:\n{}", table(&reports));
+    }
 
     #[test]
     fn numbers_have_three_digits() {
