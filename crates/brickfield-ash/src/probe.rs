@@ -38,7 +38,6 @@ impl Probe for AshBackend {
             device_ms.extend(self.queue.run_timed("reading textures", |recorder| recorder.dispatch(&bound, groups))?);
             wall_ms.push(milliseconds_since(begin));
         }
-        drop(bound);
         let mut of_rays = vec![0.0; n_bytes / size_of::<f32>()];
         let bytes = self.staging.read(&mut self.queue, means.reserve(&self.device, n_bytes)?, n_bytes)?;
         bytemuck::cast_slice_mut::<f32, u8>(&mut of_rays).copy_from_slice(bytes);
