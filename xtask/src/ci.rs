@@ -80,6 +80,8 @@ fn steps() -> Result<Vec<Step>> {
     steps.push(step("conformance, of the cases too", || {
         checked("conformance", &["--require", "cpu,wgpu,ash", "--self-check"]).run()
     }));
+    steps
+        .push(step("a GPU's measurement, in short", || checked("gpu", &["--short", "--out", "target/gpu.json"]).run()));
     let of_lamar = ["--paper", "lamar", "--check=pictures", "--require", "wgpu,ash"];
     let claims = [&of_lamar[..], &["--part", "selection,seams,shells"]].concat();
     steps.push(step("claims of LaMar, Hamann and Joy 1999", move || checked("compare", &claims).run()));

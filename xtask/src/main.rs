@@ -19,8 +19,8 @@ use spawn::{Spawn, Tool, cargo};
 /// The project's commands
 ///
 /// Start with `cargo xtask setup` on a new machine, then `cargo xtask compare`. Exit codes: 0 good, 1 something failed or
-/// is missing, 2 bad arguments; compare, conformance, orders, speed, test and bench pass on what the program that they run says.
-/// `cargo xtask compare --help` shows what can be chosen; so do those of conformance, orders and speed. They are built first.
+/// is missing, 2 bad arguments; compare, conformance, gpu, orders, speed, test and bench pass on what the program that they run says.
+/// `cargo xtask compare --help` shows what can be chosen; so do those of conformance, gpu, orders and speed. They are built first.
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", after_help = ENVIRONMENT)]
 struct Options {
@@ -54,6 +54,11 @@ enum Command {
     /// `--require cpu,wgpu,ash` makes an absent backend a failure; `--self-check` lets mutants loose on the cases.
     #[command(disable_help_flag = true)]
     Conformance(Passed),
+    /// Measure a GPU: conformance, errors, contestants, steady frames, texture reads, into one JSON file
+    ///
+    /// `--short` for a software driver. The program itself (`gpu`) runs on machines without cargo.
+    #[command(disable_help_flag = true)]
+    Gpu(Passed),
     /// Measure the order of accuracy of every quadrature rule
     #[command(disable_help_flag = true)]
     Orders(Passed),
@@ -95,6 +100,7 @@ fn main() -> Result<ExitCode> {
         Command::Compare(passed) => Tool::Compare.run(&passed.typed()),
         Command::Test(passed) => of_packages(cargo("test"), &passed.typed()),
         Command::Conformance(passed) => Tool::Conformance.run(&passed.typed()),
+        Command::Gpu(passed) => Tool::Gpu.run(&passed.typed()),
         Command::Orders(passed) => Tool::Orders.run(&passed.typed()),
         Command::Speed(passed) => Tool::Speed.run(&passed.typed()),
         Command::Bench(passed) => of_packages(cargo("bench").arg("--benches"), &passed.typed()),

@@ -15,6 +15,7 @@ pub(crate) struct Spawn(Command);
 pub(crate) enum Tool {
     Compare,
     Conformance,
+    Gpu,
     Orders,
     Speed,
 }
@@ -85,6 +86,7 @@ impl Tool {
         match self {
             Tool::Compare => "compare",
             Tool::Conformance => "conformance",
+            Tool::Gpu => "gpu",
             Tool::Orders => "orders",
             Tool::Speed => "speed",
         }

@@ -176,3 +176,42 @@ fn describe(device: &PhysicalDevice) -> Description {
     capabilities.sub_texel_bits = limits.sub_texel_precision_bits;
     Description::new("ash", device.summary.name.clone(), device.summary.driver.clone(), capabilities)
 }
+
+#[cfg(test)]
+#[path = "../tests/replay/plans.rs"]
+#[expect(dead_code, reason = "the integration tests use the rest")]
+mod plans;
+
+#[cfg(test)]
+mod tests {
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    use brickfield_frame::{Mode, QuadratureRule, SampleFormat};
+
+    use super::plans::{bumps, plan, rising};
+    use super::*;
+    use crate::Validation;
+    use crate::vulkan::Use;
+
+    #[test]
+    fn after_a_panic_while_recording_the_next_frame_is_the_same_and_the_layer_silent() {
+        let mut backend = match AshBackend::new(&Options { validation: Validation::On, ..Options::default() }) {
+            Ok(backend) => backend,
+            Err(e @ (ConnectError::NoLoader { .. } | ConnectError::NoDevice | ConnectError::NoValidationLayer)) => {
+                return println!("no device: {e}");
+            }
+            Err(e) => panic!("{e}"),
+        };
+        let plan = plan(bumps(SampleFormat::Unorm8), rising(0.05), QuadratureRule::MidpointExponential, Mode::Exact);
+        let before = backend.render(&plan).unwrap().image;
+        let panicked = catch_unwind(AssertUnwindSafe(|| {
+            backend.queue.run("testing", |recorder| {
+                recorder.barrier(Use::Nothing, Use::ShaderRead);
+                panic!("on purpose");
+            })
+        }));
+        assert!(panicked.is_err());
+        assert_eq!(backend.render(&plan).unwrap().image, before);
+        assert_eq!(backend.validation_messages(), Vec::<String>::new());
+    }
+}

@@ -6,6 +6,7 @@ mod evaluate;
 mod march;
 mod options;
 mod polygons;
+mod probe;
 mod resources;
 mod staging;
 mod texture;
@@ -13,6 +14,7 @@ mod variants;
 mod vulkan;
 
 pub use backend::AshBackend;
+pub use brickfield_frame::AdapterKind;
 pub use error::ConnectError;
-pub use options::{AdapterChoice, AdapterKind, AdapterSummary, Options, Validation, adapters};
+pub use options::{AdapterChoice, AdapterSummary, Options, Validation, adapters};
 pub use vulkan::ValidationLog;

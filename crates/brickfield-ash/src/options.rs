@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use brickfield_frame::AdapterKind;
+
 use crate::ConnectError;
 use crate::vulkan::{Instance, physical_devices};
 
@@ -27,7 +29,7 @@ impl Default for Options {
 /// Which adapter to use.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum AdapterChoice {
-    /// The first discrete GPU; without one the first integrated, virtual, software adapter.
+    /// The first of the best [`AdapterKind`].
     #[default]
     Default,
     /// The adapter of this [`AdapterSummary::index`].
@@ -57,21 +59,6 @@ pub struct AdapterSummary {
     pub driver: String,
     /// What it is.
     pub kind: AdapterKind,
-}
-
-/// What an adapter is; the best comes first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum AdapterKind {
-    /// A graphics card.
-    Discrete,
-    /// A GPU that shares the processor's memory.
-    Integrated,
-    /// A GPU lent by a host.
-    Virtual,
-    /// A driver that renders on the processor.
-    Cpu,
-    /// None of these.
-    Other,
 }
 
 impl fmt::Display for AdapterSummary {
@@ -114,7 +101,7 @@ mod tests {
     use super::*;
 
     fn list() -> Vec<AdapterSummary> {
-        [("Soft", AdapterKind::Cpu), ("Inner", AdapterKind::Integrated), ("Big Card", AdapterKind::Discrete)]
+        [("Soft", AdapterKind::Software), ("Inner", AdapterKind::Integrated), ("Big Card", AdapterKind::Discrete)]
             .into_iter()
             .enumerate()
             .map(|(index, (name, kind))| AdapterSummary { index, name: name.into(), driver: "d 1".into(), kind })
@@ -127,6 +114,17 @@ mod tests {
         assert_eq!(choose(&AdapterChoice::Default, &list()[..2]), Ok(1));
         assert_eq!(choose(&AdapterChoice::Index(0), &list()), Ok(0));
         assert_eq!(choose(&AdapterChoice::Name("card".into()), &list()), Ok(2));
+    }
+
+    #[test]
+    fn software_is_the_last_resort() {
+        let of = |kinds: [AdapterKind; 2]| {
+            let summary = |(index, kind)| AdapterSummary { index, name: "a".into(), driver: "d 1".into(), kind };
+            choose(&AdapterChoice::Default, &kinds.into_iter().enumerate().map(summary).collect::<Vec<_>>())
+        };
+        assert_eq!(of([AdapterKind::Software, AdapterKind::Other]), Ok(1));
+        assert_eq!(of([AdapterKind::Other, AdapterKind::Software]), Ok(0));
+        assert_eq!(of([AdapterKind::Other, AdapterKind::Virtual]), Ok(1));
     }
 
     #[test]

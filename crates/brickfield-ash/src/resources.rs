@@ -216,7 +216,7 @@ impl Reused {
     }
 
     /// The used bytes as a shader's binding; `None` if nothing was reserved.
-    fn bindable(&self) -> Option<Bindable<'_>> {
+    pub(crate) fn bindable(&self) -> Option<Bindable<'_>> {
         self.buffer.as_ref().map(|buffer| Bindable::Buffer { buffer, n_bytes: self.used_bytes })
     }
 }

@@ -188,7 +188,7 @@ impl Shape {
 }
 
 /// Checks that shaders can read a format, through a filter if they use a sampler.
-fn check_format(device: &Device, format: SampleFormat, filtered: bool) -> Result<(), RenderError> {
+pub(crate) fn check_format(device: &Device, format: SampleFormat, filtered: bool) -> Result<(), RenderError> {
     let what = match (format, filtered) {
         (SampleFormat::Unorm8, false) => "read textures of 8-bit samples",
         (SampleFormat::Unorm8, true) => "filter textures of 8-bit samples, as fast mode does",

@@ -331,3 +331,9 @@ fn rays_along_a_face_between_bricks_see_every_segment() {
         check(&Setup { camera, size: UVec2::new(33, 17), ..Setup::new(&volume, transfer) });
     }
 }
+
+#[test]
+fn a_backend_may_move_to_another_thread() {
+    fn check<T: Send>() {}
+    check::<CpuBackend>();
+}

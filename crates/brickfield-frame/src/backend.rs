@@ -6,6 +6,8 @@ use brickfield_core::glam::{UVec2, UVec3};
 use crate::FramePlan;
 
 /// Replays frame plans; decides nothing.
+///
+/// A backend may move to another thread: a viewer renders on a thread of its own. It is not shared between threads.
 pub trait Backend: Send {
     /// What this backend is, and what it can do.
     fn describe(&self) -> &Description;
@@ -217,4 +219,15 @@ pub fn check_memory(size: UVec2) -> Result<(), RenderError> {
     let n_pixels = size.x as usize * size.y as usize;
     let n_bytes = n_pixels as u64 * size_of::<[f32; 4]>() as u64;
     Vec::<[f32; 4]>::new().try_reserve_exact(n_pixels).map_err(|_| RenderError::NoMemory { size, n_bytes })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_backend_may_move_to_another_thread() {
+        fn check<T: Send + ?Sized>() {}
+        check::<dyn Backend>();
+    }
 }

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod adapter;
 mod backend;
 mod content;
 mod facets;
@@ -7,6 +8,7 @@ mod feature;
 mod field;
 mod pass;
 mod plan;
+mod probe;
 mod proxy;
 mod rays;
 mod resource;
@@ -17,6 +19,7 @@ mod surfaces;
 mod uniform;
 mod value_scale;
 
+pub use adapter::AdapterKind;
 pub use backend::{
     Backend, Capabilities, Description, Evaluate, Frame, RenderError, ShaderFunction, Timing, check_memory,
 };
@@ -29,6 +32,7 @@ pub use field::{
 };
 pub use pass::Pass;
 pub use plan::{Drawing, FramePlan, PlanError, PlanParts};
+pub use probe::{Fetch, Probe, ProbeUniforms, TextureReads, TextureWork};
 pub use proxy::{ProxyCorner, ProxyGeometry, Target};
 pub use rays::{PlanRay, RayFrame};
 pub use resource::{Content, Resource};

@@ -39,6 +39,10 @@ pub enum Resource {
     Drawn,
     /// The planes of the facets of tessellated shells.
     Facets,
+    /// The numbers of a probe ([`ProbeUniforms`](crate::ProbeUniforms)).
+    Probe,
+    /// The means of a probe's rays.
+    Means,
 }
 
 /// What a plan brings for a resource.
@@ -53,7 +57,7 @@ pub enum Content<'a> {
 
 impl Resource {
     /// All resources.
-    pub const ALL: [Resource; 14] = [
+    pub const ALL: [Resource; 16] = [
         Resource::Frame,
         Resource::Atlas,
         Resource::AtlasSampler,
@@ -68,6 +72,8 @@ impl Resource {
         Resource::Beams,
         Resource::Drawn,
         Resource::Facets,
+        Resource::Probe,
+        Resource::Means,
     ];
 
     /// The name in shaders and messages.
@@ -87,6 +93,8 @@ impl Resource {
             Resource::Beams => "beams",
             Resource::Drawn => "drawn",
             Resource::Facets => "facets",
+            Resource::Probe => "probe",
+            Resource::Means => "means",
         }
     }
 
@@ -118,7 +126,9 @@ impl FramePlan {
             | Resource::Picture
             | Resource::Inputs
             | Resource::Outputs
-            | Resource::SeenBefore => None,
+            | Resource::SeenBefore
+            | Resource::Probe
+            | Resource::Means => None,
         }
     }
 }

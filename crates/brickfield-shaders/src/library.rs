@@ -27,7 +27,7 @@ const fn one_of(path: &'static str, name: &'static str, text: &'static str) -> M
     Module { name, path, text: Cow::Borrowed(text) }
 }
 
-const EMBEDDED: [Module; 18] = [
+const EMBEDDED: [Module; 19] = [
     own("frame", include_str!("wesl/frame.wesl")),
     own("scalar", include_str!("wesl/scalar.wesl")),
     own("transfer", include_str!("wesl/transfer.wesl")),
@@ -46,6 +46,7 @@ const EMBEDDED: [Module; 18] = [
     own("march", include_str!("wesl/march.wesl")),
     own("proxy", include_str!("wesl/proxy.wesl")),
     own("evaluate", include_str!("wesl/evaluate.wesl")),
+    own("probe", include_str!("wesl/probe.wesl")),
 ];
 
 /// The shader sources: modules of WESL text by name.

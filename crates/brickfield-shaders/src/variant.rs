@@ -1,7 +1,7 @@
 //! Which shader a plan needs.
 
 use brickfield_frame::{
-    Division, Feature, FeatureSet, FramePlan, Lengths, Placement, Places, QuadratureRule, ShaderFunction,
+    Division, Feature, FeatureSet, Fetch, FramePlan, Lengths, Placement, Places, QuadratureRule, ShaderFunction,
 };
 
 use crate::passes::has_long_rays;
@@ -170,12 +170,15 @@ pub enum Entry {
     Proxy,
     /// Evaluates one function on a list of inputs.
     Evaluate(ShaderFunction),
+    /// Reads textures and does nothing else, to be timed ([`brickfield_frame::Probe`]).
+    Probe(Fetch),
 }
 
 impl Entry {
-    /// All kinds of entries, the last for each function.
+    /// All kinds of entries, the last two for each function and each fetch.
     pub fn all() -> impl Iterator<Item = Entry> {
-        [Entry::March, Entry::Proxy].into_iter().chain(ShaderFunction::ALL.into_iter().map(Entry::Evaluate))
+        let functions = ShaderFunction::ALL.into_iter().map(Entry::Evaluate);
+        [Entry::March, Entry::Proxy].into_iter().chain(functions).chain(Fetch::ALL.map(Entry::Probe))
     }
 
     /// The names of the entry points: one for compute, or one for vertices and one for fragments.
@@ -184,6 +187,8 @@ impl Entry {
             Entry::March => &["march"],
             Entry::Proxy => &["project", "shade"],
             Entry::Evaluate(_) => &["evaluate"],
+            Entry::Probe(Fetch::Filtered) => &["filtered"],
+            Entry::Probe(Fetch::Loaded) => &["loaded"],
         }
     }
 
@@ -193,6 +198,7 @@ impl Entry {
             Entry::March => "march",
             Entry::Proxy => "proxy",
             Entry::Evaluate(_) => "evaluate",
+            Entry::Probe(_) => "probe",
         }
     }
 }
@@ -241,6 +247,11 @@ impl Variant {
 
     fn reads_field(self) -> bool {
         READS_FIELD.into_iter().any(|f| self.features.contains(f)) || self.segments.division == Division::Brick
+    }
+
+    /// The shader that reads textures one way. It has nothing of a plan's.
+    pub fn probe(fetch: Fetch) -> Variant {
+        Variant::new(FeatureSet::default(), QuadratureRule::MidpointExponential, Entry::Probe(fetch))
     }
 
     /// The conditions (`@if(name)`) that hold.

@@ -2,7 +2,7 @@
 
 use std::mem::{offset_of, size_of};
 
-use brickfield_frame::{FeatureSet, FrameUniforms, KnotUniform, PlaceUniform, QuadratureRule};
+use brickfield_frame::{FeatureSet, Fetch, FrameUniforms, KnotUniform, PlaceUniform, ProbeUniforms, QuadratureRule};
 use brickfield_shaders::naga::{Module, TypeInner};
 use brickfield_shaders::{Entry, FieldKind, Variant, specialise};
 
@@ -38,4 +38,7 @@ fn host_and_shader_structs_have_the_same_layout() {
         voxel_world, padding_1));
     assert_equal(&module, "Knot", host!(KnotUniform, optics, value, per_value, padding));
     assert_equal(&module, "Place", host!(PlaceUniform, texel, level, first, padding, last, axes));
+    for fetch in Fetch::ALL {
+        assert_equal(&specialise(&Variant::probe(fetch)).unwrap().module, "Probe", host!(ProbeUniforms, work));
+    }
 }

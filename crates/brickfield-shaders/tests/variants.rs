@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use brickfield_frame::{Division, Feature, FeatureSet, Lengths, QuadratureRule, Resource, ShaderFunction};
+use brickfield_frame::{Division, Feature, FeatureSet, Fetch, Lengths, QuadratureRule, Resource, ShaderFunction};
 use brickfield_shaders::{
     BindingKind, Entry, FieldKind, KnotSearch, Segments, ShaderError, ShaderLibrary, Specialised, Surfaces, Variant,
     specialise,
@@ -106,6 +106,7 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
                 let of_rays = [Resource::Index, Resource::Picture, Resource::SeenBefore, Resource::Beams];
                 assert!(!of_rays.into_iter().any(uses), "{:?}", resources(&shader));
             }
+            Entry::Probe(_) => assert!(uses(Resource::Means)),
             Entry::Evaluate(_) => {
                 let outputs = |b: &&brickfield_shaders::Binding| b.resource == Resource::Outputs;
                 let outputs = shader.bindings.iter().find(outputs).unwrap();
@@ -195,4 +196,16 @@ fn functions_bind_what_they_read() {
     assert_eq!(of(ShaderFunction::Classify), [Frame, Knots, Inputs, Outputs]);
     assert_eq!(of(ShaderFunction::Sample), [Frame, Atlas, Index, Inputs, Outputs]);
     assert_eq!(of(ShaderFunction::RayAnchor), [Frame, Inputs, Outputs]);
+}
+
+#[test]
+fn a_probe_reads_one_way_and_binds_no_more() {
+    use Resource::{Atlas, AtlasSampler, Means, Probe};
+    let filtered = compile(&Variant::probe(Fetch::Filtered));
+    assert_eq!((resources(&filtered), filtered.workgroup_size), (vec![Probe, Atlas, AtlasSampler, Means], [8, 8, 1]));
+    assert!(!filtered.wgsl.contains("textureLoad"));
+    let loaded = compile(&Variant::probe(Fetch::Loaded));
+    assert_eq!((resources(&loaded), loaded.workgroup_size), (vec![Probe, Atlas, Means], [8, 8, 1]));
+    assert!(!loaded.wgsl.contains("textureSample"));
+    assert!([filtered, loaded].iter().all(|shader| shader.spirv().unwrap().len() > 100));
 }

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use brickfield_frame::AdapterKind;
+
 use crate::device::Device;
 
 /// An adapter, as its driver states it.
@@ -13,14 +15,14 @@ pub struct AdapterSummary {
     pub name: String,
     /// The driver's name and version.
     pub driver: String,
-    /// What kind of device it is: `discrete`, `integrated`, `virtual`, `software` or `other`.
-    pub kind: &'static str,
+    /// What it is.
+    pub kind: AdapterKind,
 }
 
 /// Which adapter to open.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum AdapterChoice {
-    /// The first of the fastest kind there is: discrete, integrated, virtual, other, software.
+    /// The first of the best [`AdapterKind`].
     #[default]
     Default,
     /// The adapter at this place in [`adapters`]' list.
@@ -98,7 +100,7 @@ fn enumerate(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
 fn summaries(adapters: &[wgpu::Adapter]) -> Vec<AdapterSummary> {
     let summary = |(index, adapter): (usize, &wgpu::Adapter)| {
         let info = adapter.get_info();
-        AdapterSummary { index, driver: driver(&info), kind: KINDS[rank(info.device_type)], name: info.name }
+        AdapterSummary { index, driver: driver(&info), kind: kind(info.device_type), name: info.name }
     };
     adapters.iter().enumerate().map(summary).collect()
 }
@@ -109,10 +111,7 @@ fn driver(info: &wgpu::AdapterInfo) -> String {
 
 fn place(choice: &AdapterChoice, available: &[AdapterSummary]) -> Option<usize> {
     match choice {
-        AdapterChoice::Default => {
-            let rank = |s: &AdapterSummary| KINDS.iter().position(|k| *k == s.kind);
-            available.iter().min_by_key(|s| rank(s)).map(|s| s.index)
-        }
+        AdapterChoice::Default => available.iter().min_by_key(|s| s.kind).map(|s| s.index),
         AdapterChoice::Index(index) => (*index < available.len()).then_some(*index),
         AdapterChoice::Name(name) => {
             let name = name.to_lowercase();
@@ -121,16 +120,13 @@ fn place(choice: &AdapterChoice, available: &[AdapterSummary]) -> Option<usize> 
     }
 }
 
-/// From the fastest.
-const KINDS: [&str; 5] = ["discrete", "integrated", "virtual", "other", "software"];
-
-fn rank(device_type: wgpu::DeviceType) -> usize {
+fn kind(device_type: wgpu::DeviceType) -> AdapterKind {
     match device_type {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::IntegratedGpu => 1,
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
+        wgpu::DeviceType::DiscreteGpu => AdapterKind::Discrete,
+        wgpu::DeviceType::IntegratedGpu => AdapterKind::Integrated,
+        wgpu::DeviceType::VirtualGpu => AdapterKind::Virtual,
+        wgpu::DeviceType::Other => AdapterKind::Other,
+        wgpu::DeviceType::Cpu => AdapterKind::Software,
     }
 }
 
@@ -138,13 +134,13 @@ fn rank(device_type: wgpu::DeviceType) -> usize {
 mod tests {
     use super::*;
 
-    fn summary(index: usize, name: &str, kind: &'static str) -> AdapterSummary {
+    fn summary(index: usize, name: &str, kind: AdapterKind) -> AdapterSummary {
         AdapterSummary { index, name: name.to_owned(), driver: "driver 1".to_owned(), kind }
     }
 
     #[test]
     fn adapters_are_chosen_by_kind_place_and_name() {
-        let there = [summary(0, "llvmpipe", "software"), summary(1, "Big One", "discrete")];
+        let there = [summary(0, "llvmpipe", AdapterKind::Software), summary(1, "Big One", AdapterKind::Discrete)];
         assert_eq!(place(&AdapterChoice::Default, &there), Some(1));
         assert_eq!(place(&AdapterChoice::Index(0), &there), Some(0));
         assert_eq!(place(&AdapterChoice::Index(2), &there), None);
@@ -153,8 +149,19 @@ mod tests {
     }
 
     #[test]
+    fn software_is_the_last_resort() {
+        let of = |kinds: [AdapterKind; 2]| {
+            let there = [summary(0, "a", kinds[0]), summary(1, "b", kinds[1])];
+            place(&AdapterChoice::Default, &there)
+        };
+        assert_eq!(of([AdapterKind::Software, AdapterKind::Other]), Some(1));
+        assert_eq!(of([AdapterKind::Other, AdapterKind::Software]), Some(0));
+        assert_eq!(of([AdapterKind::Other, AdapterKind::Virtual]), Some(1));
+    }
+
+    #[test]
     fn errors_say_what_there_is() {
-        let available = vec![summary(0, "llvmpipe", "software")];
+        let available = vec![summary(0, "llvmpipe", AdapterKind::Software)];
         let error = OpenError::NoSuchAdapter { choice: AdapterChoice::Name("x".into()), available };
         assert_eq!(
             error.to_string(),

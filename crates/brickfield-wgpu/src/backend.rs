@@ -25,9 +25,9 @@ use crate::{AdapterChoice, OpenError, adapter};
 /// On the device stay: the contents of the last plan, of which the next one brings what is not there; the pipeline of each shader
 /// variant, the picture, and buffers that grow when they must.
 pub struct WgpuBackend {
-    device: Device,
-    pipelines: Pipelines,
-    clock: Option<Clock>,
+    pub(crate) device: Device,
+    pub(crate) pipelines: Pipelines,
+    pub(crate) clock: Option<Clock>,
     resources: Resources,
     polygons: Polygons,
     staging: Reused,

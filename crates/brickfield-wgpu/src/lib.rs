@@ -8,8 +8,10 @@ mod device;
 mod picture;
 mod pipeline;
 mod polygons;
+mod probe;
 mod resources;
 mod texture;
 
 pub use adapter::{AdapterChoice, AdapterSummary, OpenError, adapters};
 pub use backend::WgpuBackend;
+pub use brickfield_frame::AdapterKind;

@@ -88,7 +88,9 @@ fn from_shader(device: &wgpu::Device, shader: Specialised, target: Target) -> Pi
     });
     let program = match entry {
         Entry::Proxy => Program::Polygons(polygons(device, &pipeline_layout, &module, target)),
-        Entry::March | Entry::Evaluate(_) => Program::Compute(compute(device, &pipeline_layout, &module, label)),
+        Entry::March | Entry::Evaluate(_) | Entry::Probe(_) => {
+            Program::Compute(compute(device, &pipeline_layout, &module, label))
+        }
     };
     Pipeline { program, layout, bindings: shader.bindings, workgroup_size: shader.workgroup_size }
 }
@@ -169,7 +171,7 @@ fn layout_entry(binding: &Binding, entry: Entry, filtered: bool) -> wgpu::BindGr
     };
     let visibility = match entry {
         Entry::Proxy => wgpu::ShaderStages::VERTEX_FRAGMENT,
-        Entry::March | Entry::Evaluate(_) => wgpu::ShaderStages::COMPUTE,
+        Entry::March | Entry::Evaluate(_) | Entry::Probe(_) => wgpu::ShaderStages::COMPUTE,
     };
     wgpu::BindGroupLayoutEntry { binding: binding.index, visibility, ty, count: None }
 }

@@ -237,7 +237,8 @@ fn layer_bytes(slots: &Slots, shape: AtlasShape, layer: u32) -> Vec<u8> {
     bytes
 }
 
-fn stored_as(device: &Device, format: SampleFormat) -> Result<TextureFormat, RenderError> {
+/// A texel's format on a device.
+pub(crate) fn stored_as(device: &Device, format: SampleFormat) -> Result<TextureFormat, RenderError> {
     match format {
         SampleFormat::Unorm8 => Ok(TextureFormat::R8Unorm),
         SampleFormat::Unorm16 if device.has(Features::TEXTURE_FORMAT_16BIT_NORM) => Ok(TextureFormat::R16Unorm),

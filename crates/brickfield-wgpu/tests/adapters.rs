@@ -26,3 +26,9 @@ fn every_adapter_opens_by_its_place_and_name() {
         assert!(WgpuBackend::new(&AdapterChoice::Name(adapter.name.to_uppercase())).is_ok());
     }
 }
+
+#[test]
+fn a_backend_may_move_to_another_thread() {
+    fn check<T: Send>() {}
+    check::<WgpuBackend>();
+}

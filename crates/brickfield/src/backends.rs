@@ -3,6 +3,8 @@
 use std::fmt;
 
 use brickfield_cpu::CpuBackend;
+#[cfg(any(feature = "wgpu", feature = "ash"))]
+use brickfield_frame::AdapterKind;
 use brickfield_frame::Backend;
 
 /// A backend by name.
@@ -136,7 +138,7 @@ fn open_cpu(adapter: Option<&str>) -> Result<Box<dyn Backend>, BackendError> {
 #[cfg(feature = "wgpu")]
 fn wgpu_adapters() -> Result<Vec<AdapterInfo>, String> {
     let info = |a: brickfield_wgpu::AdapterSummary| {
-        let is_software = a.kind == "software";
+        let is_software = a.kind == AdapterKind::Software;
         AdapterInfo { index: a.index, name: a.name, driver: a.driver, is_software }
     };
     let list: Vec<_> = brickfield_wgpu::adapters().into_iter().map(info).collect();
@@ -158,7 +160,7 @@ fn open_wgpu(adapter: Option<&str>, validation: Validation) -> Result<Box<dyn Ba
 #[cfg(feature = "ash")]
 fn ash_adapters() -> Result<Vec<AdapterInfo>, String> {
     let info = |a: brickfield_ash::AdapterSummary| {
-        let is_software = a.kind == brickfield_ash::AdapterKind::Cpu;
+        let is_software = a.kind == AdapterKind::Software;
         AdapterInfo { index: a.index, name: a.name, driver: a.driver, is_software }
     };
     let list: Vec<_> = brickfield_ash::adapters().map_err(|e| e.to_string())?.into_iter().map(info).collect();

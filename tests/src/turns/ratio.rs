@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::metrics::median;
 
@@ -10,7 +10,7 @@ use crate::metrics::median;
 pub const CONFIDENCE: f64 = 0.95;
 
 /// Milliseconds over rounds.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct Spread {
     pub median: f64,

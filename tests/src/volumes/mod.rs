@@ -3,10 +3,12 @@
 //! A field is a function of the world position. [`fill`] samples it at the voxel centres of a grid; [`fill_unit`] first
 //! spreads [0, 1] over the whole range of an integer type, so that one field serves every scalar type.
 
+mod enlarge;
 mod field;
 mod phantom;
 mod shape;
 
+pub use enlarge::enlarge;
 pub use field::Field;
 pub use phantom::{PHANTOM_DIMS, Phantom, phantom, phantom_camera, phantom_of, phantom_transfer};
 pub use shape::Shape;

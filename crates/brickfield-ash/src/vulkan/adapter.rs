@@ -88,7 +88,7 @@ fn kind(device_type: vk::PhysicalDeviceType) -> AdapterKind {
         vk::PhysicalDeviceType::DISCRETE_GPU => AdapterKind::Discrete,
         vk::PhysicalDeviceType::INTEGRATED_GPU => AdapterKind::Integrated,
         vk::PhysicalDeviceType::VIRTUAL_GPU => AdapterKind::Virtual,
-        vk::PhysicalDeviceType::CPU => AdapterKind::Cpu,
+        vk::PhysicalDeviceType::CPU => AdapterKind::Software,
         _ => AdapterKind::Other,
     }
 }

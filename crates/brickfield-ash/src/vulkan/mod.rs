@@ -3,6 +3,14 @@
 //! Three rules make the functions of this module safe. A value keeps its device alive (`Arc<Device>`) and destroys its
 //! object when dropped. A [`Recorder`] borrows what it records for as long as [`Queue::run`] lasts. And `run` returns only
 //! when the device has finished, so no object is destroyed, rewritten or read while the device works with it.
+//!
+//! Vulkan binds no object to a thread, so all of them are `Send`. What it asks for is that no two threads use certain objects at
+//! once ("externally synchronized"): the queue, the command pool and its buffer, the fence, a descriptor set and its pool. Each
+//! of these is reached only through a mutable borrow of the [`Queue`] or [`Pipeline`] that owns it, so that a backend may move
+//! between threads and is used by one at a time. Memory is mapped once, when it is made; the pointer belongs to its
+//! [`HostBuffer`]. Instance and device are shared (`Arc<Device>`, therefore `Sync`): only calls that ask for no
+//! synchronisation take them by a shared borrow, and the one that destroys each has the last handle. The validation layer calls
+//! back on the thread that called it; its log is behind a mutex.
 
 mod adapter;
 mod buffer;

@@ -47,7 +47,8 @@ impl Queue {
 
     /// Records, submits, and waits until the device has finished.
     ///
-    /// What is recorded is borrowed for `'a`, which lasts at least until the device has finished.
+    /// What is recorded is borrowed for `'a`, which lasts at least until the device has finished. If `record` panics nothing
+    /// is submitted, and the queue can be used again.
     pub(crate) fn run<'a>(
         &mut self,
         doing: &'static str,
@@ -75,7 +76,12 @@ impl Queue {
     ) -> Result<(), FailedCall> {
         let (device, commands) = (self.device.raw(), self.commands);
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        // SAFETY: the last run has ended, so the command buffer is not in use; beginning resets it.
+        // A panic while commands are recorded leaves the command buffer open, where beginning is invalid: it is reset first.
+        // SAFETY: the last run has ended, so the command buffer is not pending; in every other state it may be reset, and
+        // its pool allows that.
+        unsafe { device.reset_command_buffer(commands, vk::CommandBufferResetFlags::empty()) }
+            .of("vkResetCommandBuffer")?;
+        // SAFETY: the command buffer was reset.
         unsafe { device.begin_command_buffer(commands, &begin) }.of("vkBeginCommandBuffer")?;
         if let Some(t) = timestamps {
             // SAFETY: the pool has two queries, which are reset before they are written.

@@ -3,6 +3,7 @@
 mod functions;
 mod pictures;
 mod plans;
+mod probe;
 mod refusals;
 mod reuse;
 mod validation;

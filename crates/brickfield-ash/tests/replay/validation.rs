@@ -48,3 +48,15 @@ fn exercise(backend: &mut AshBackend, plan: &FramePlan) {
         backend.evaluate(plan, function, &[[0.5; 4]; 100]).unwrap();
     }
 }
+
+#[test]
+fn on_another_thread_the_picture_is_the_same_and_the_layer_silent() {
+    let Some(mut backend) = connect(Validation::On) else { return };
+    let plan = plan(bumps(SampleFormat::Unorm16), rising(0.05), QuadratureRule::MidpointExponential, Mode::Exact);
+    let here = backend.render(&plan).unwrap().image;
+    let log = backend.validation_log();
+    let moved = std::thread::spawn(move || backend.render(&plan).unwrap().image);
+    assert_eq!(moved.join().unwrap(), here);
+    // It ended on the other thread.
+    assert_eq!(log.drain(), Vec::<String>::new());
+}
