@@ -146,15 +146,15 @@ impl Texture {
         Ok(n_bytes)
     }
 
-    /// Writes bricks one by one, or a layer at once if nothing of it is held: of a slot without samples the device may still
-    /// hold the last ones.
+    /// Writes bricks one by one, or a layer at once if most of it is missing and nothing is held: of a slot without samples the
+    /// device may still hold the last ones.
     fn write_bricks(&self, device: &Device, slots: &Slots, shape: AtlasShape, missing: &[u32]) -> u64 {
         let per_layer = shape.bricks.x * shape.bricks.y;
         let (mut n_bytes, mut waiting) = (0, 0);
         for layer in missing.chunk_by(|a, b| a / per_layer == b / per_layer) {
             let z = layer[0] / per_layer;
             let is_new = !(z * per_layer..(z + 1) * per_layer).any(|slot| self.held.has_any(slot as usize));
-            let written = match is_new {
+            let written = match is_new && 2 * layer.len() as u32 > per_layer {
                 true => self.write_layer(device, slots, shape, z),
                 false => layer.iter().map(|slot| self.write_slot(device, slots, *slot)).sum(),
             };
