@@ -22,6 +22,7 @@ mod run;
 mod samples;
 mod self_check;
 pub mod shader_mutants;
+mod storage;
 mod surfaces;
 
 pub use ahead::for_each_prepared;
@@ -37,3 +38,4 @@ pub use rule::{Complaint, PlanTolerance, Tolerance, Verdict};
 pub use run::Run;
 pub use self_check::SelfCheck;
 pub use shader_mutants::ShaderMutant;
+pub use storage::Storage;
