@@ -133,7 +133,7 @@ impl Line {
 /// By how much, per world unit from the eye, rays of a tile may lie outside the box around its corners' rays.
 ///
 /// The ends of rays of length 1 are n = v / |v| with v affine in the pixel and |v| >= 1: second derivatives of n are at most
-/// 3 |v'|^2, so that n is within 3/8 of the square of the tile's diagonal of what is bilinear between the corners.
+/// 3 |v'|^2, so that n is within 3/8 of the square of the tile's diagonal of the bilinear interpolation between the corners.
 fn swell(rays: &RayFrame, diagonal: f64) -> DVec3 {
     if rays.pixel == 0.0 {
         return DVec3::ZERO;
