@@ -20,7 +20,7 @@ use crate::placement::GridPlacement;
 use crate::samples::{allocate, append_binary, append_text, least_text_bytes};
 use crate::{Format, Limits, Note, Opened, ReadError};
 use blocks::{WordReader, check_plain, read_blocks};
-use document::{Array, Document, Storage, Support};
+use document::{Array, ArrayStorage, Document, Support};
 use inline::{Base64Reader, UntilTag};
 
 /// Reads a .vti file.
@@ -125,17 +125,17 @@ fn read_array(
     source.seek(SeekFrom::Start(position)).map_err(|e| ReadError::io(&what, e))?;
     let n_left = n_bytes_left(source)?;
     match document.storage(array)? {
-        Storage::Text => {
+        ArrayStorage::Text => {
             check_length(&what, n_left, least_text_bytes(shape.n_voxels()))?;
             let mut voxels = allocate(shape)?;
             append_text(&mut voxels, &mut UntilTag::new(source), shape.n_voxels(), &what)?;
             Ok(voxels)
         }
-        Storage::Raw => {
+        ArrayStorage::Raw => {
             let n_tail = n_closing_bytes(source, n_left).map_err(|e| ReadError::io(&what, e))?;
             read_binary(source, n_left - n_tail, document, shape, &what)
         }
-        Storage::Base64 => {
+        ArrayStorage::Base64 => {
             let mut decoded = Base64Reader::new(UntilTag::new(source));
             read_binary(&mut decoded, n_left / 4 * 3 + 3, document, shape, &what)
         }
