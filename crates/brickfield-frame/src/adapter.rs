@@ -1,8 +1,8 @@
-//! What an adapter is, and which kind is preferred.
+//! The kinds of adapters, and the order in which they are preferred.
 
 use std::fmt;
 
-/// What an adapter is.
+/// The kind of an adapter.
 ///
 /// The order is the order of preference, the same for every backend: without another wish a backend opens the first adapter of
 /// the least kind. An adapter of an unknown kind comes before one in software, which is never the faster one.

@@ -9,18 +9,18 @@ use crate::FramePlan;
 ///
 /// A backend may move to another thread: a viewer renders on a thread of its own. It is not shared between threads.
 pub trait Backend: Send {
-    /// What this backend is, and what it can do.
+    /// The backend's name, adapter, driver and capabilities.
     fn describe(&self) -> &Description;
 
-    /// What the driver's validation layer said so far; empty where there is none, or it was not asked for.
+    /// The messages of the driver's validation layer so far; empty without a layer, or if it was not asked for.
     fn validation_messages(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// Renders a frame. What the plan shares with the last one (bricks, shader variant) stays on the device.
+    /// Renders a frame. Bricks and shader variants that the plan shares with the last one stay on the device.
     ///
     /// # Errors
-    /// What the device could not do: how much was asked, and the limit.
+    /// A request beyond a limit of the device: the amount that was asked for, and the limit.
     fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError>;
 
     /// The backend as one that evaluates single functions, if it is.
@@ -43,7 +43,7 @@ pub trait Evaluate {
     ) -> Result<Vec<[f32; 4]>, RenderError>;
 }
 
-/// What a backend is.
+/// A backend's name, adapter, driver and capabilities.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Description {
@@ -53,7 +53,7 @@ pub struct Description {
     pub adapter: String,
     /// The driver's name and version.
     pub driver: String,
-    /// What it can do.
+    /// Its limits.
     pub capabilities: Capabilities,
 }
 
@@ -64,7 +64,7 @@ impl Description {
     }
 }
 
-/// What a backend can do; a plan is prepared for it.
+/// The limits of a backend; a plan is prepared for them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Capabilities {

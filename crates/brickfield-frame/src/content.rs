@@ -1,4 +1,4 @@
-//! Contents that frames share, and what a device holds of them.
+//! Contents that frames share, and the chunks of them that a device holds.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -164,7 +164,7 @@ mod tests {
         let new = List(ContentId::new(), chunks);
         assert_eq!(held.missing(&new), [1..3, 4..5]);
         held.hold(&new);
-        // What nobody read meanwhile is still there.
+        // A chunk that no shader read meanwhile is still there.
         assert_eq!(held.missing(&List(ContentId::new(), vec![None, None, None, old.1[3].clone()])), []);
         held.forget();
         assert_eq!(held.missing(&new), [0..3, 4..5]);

@@ -1,6 +1,6 @@
-//! What a scene needs of a renderer, as a set.
+//! The features that a scene needs of a renderer, as a set.
 
-/// One thing that a scene may need; what is not in the set is left out of the shader.
+/// A feature that a scene may need; features that are not in the set are left out of the shader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Feature {
@@ -12,7 +12,7 @@ pub enum Feature {
     SkipEmpty,
     /// Some macrocells of bricks are dark: rays leap over them.
     SkipMacrocells,
-    /// Tiles of the picture have beams: rays leave out what these pass over.
+    /// Tiles of the picture have beams: rays leave out the segments that their beam passes over.
     SkipBesideBeams,
     /// Some slots are coarser than level 0.
     MultiLevel,

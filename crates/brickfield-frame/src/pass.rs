@@ -7,7 +7,7 @@ use std::ops::Range;
 pub struct Pass {
     /// Rows of the picture.
     pub rows: Range<u32>,
-    /// Segments, counted from the frame's start; what lies before was seen by earlier passes over the same rows.
+    /// Segments, counted from the frame's start; segments before them were integrated by earlier passes over the same rows.
     pub segments: Range<f32>,
 }
 

@@ -41,7 +41,7 @@ pub struct PlanParts {
     pub sampling: Sampling,
     /// Extinction per world unit and colour over data values.
     pub transfer: TransferFunction,
-    /// What rays need not look at; by default everything is looked at.
+    /// The regions that rays leave out; by default none.
     pub dark: DarkRegions,
     /// How backends that can do both make the picture.
     pub drawing: Drawing,
@@ -57,7 +57,7 @@ pub enum Drawing {
     Polygons {
         /// An index cell of each resident block, the farthest block first.
         back_to_front: Vec<UVec3>,
-        /// What they are blended into.
+        /// The pixel format that they are blended into.
         target: Target,
     },
 }
@@ -189,7 +189,7 @@ impl FramePlan {
         self.proxy.as_ref()
     }
 
-    /// What the frame needs of a shader.
+    /// The features that the frame needs of a shader.
     #[inline]
     pub fn features(&self) -> FeatureSet {
         self.features
@@ -206,8 +206,8 @@ impl FramePlan {
         ValueScale::of(&self.transfer, self.field.slots().decode())
     }
 
-    /// Whether shaders turn what they read of a texture back into the integers that were stored: 16-bit samples where
-    /// no hardware filters them. Of a fraction in [0, 1], f32 has too few digits left for what lies between two of them.
+    /// Whether shaders turn texture reads back into the integers that were stored: 16-bit samples where
+    /// no hardware filters them. f32 has too few digits for the values between two neighbouring samples, as fractions of 1.
     pub fn reads_integers(&self) -> bool {
         self.field.slots().format() == SampleFormat::Unorm16 && !self.features.contains(Feature::HardwareFilter)
     }

@@ -1,4 +1,4 @@
-//! How fast a device reads textures: what a renderer's speed is compared with.
+//! How fast a device reads textures, to compare a renderer's speed with.
 
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use bytemuck::{Pod, Zeroable};
@@ -42,7 +42,7 @@ pub struct TextureWork {
     pub n_samples: u32,
 }
 
-/// What came of it.
+/// The times and means of a probe's runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextureReads {
     /// Milliseconds of each run, as the device's timestamps say; none where it has none.

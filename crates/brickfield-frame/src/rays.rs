@@ -149,7 +149,7 @@ impl RayFrame {
     /// A position is anchor + direction (t - t_anchor), relative to the centre. Anchor and direction are themselves sums of three
     /// terms, which may cancel; t is one of products. Each term is the result of at most eight roundings (three products and
     /// two sums for the anchor, the same and a normalisation for the direction, a product and a sum for t), each of at most
-    /// 2^-24 of the term; and so is what shifts it to the first sample and divides it by the brick's cells. So it is off by at
+    /// 2^-24 of the term; so are the shift to the first sample and the division by the brick's cells. So it is off by at
     /// most 8 * 2^-24 * (|center| + anchor + direction (|t| + |t_anchor|)), where anchor and direction are sums of magnitudes.
     pub fn rounding(&self, x: u32, y: u32, ray: &PlanRay, far: f64) -> DVec3 {
         let at = self.past_middle(x, y);

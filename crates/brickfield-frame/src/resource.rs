@@ -1,4 +1,4 @@
-//! What shaders read and write, by name.
+//! The buffers, textures and samplers of shaders, by name.
 
 use std::borrow::Cow;
 
@@ -45,13 +45,13 @@ pub enum Resource {
     Means,
 }
 
-/// What a plan brings for a resource.
+/// The data that a plan brings for a resource.
 pub enum Content<'a> {
     /// Numbers of this frame, brought with every frame.
     Bytes(Cow<'a, [u8]>),
-    /// A list that frames share: what a device holds of it is not brought again.
+    /// A list that frames share: chunks that a device holds are not brought again.
     Chunks(&'a dyn Chunked),
-    /// Samples as a 3-D texture; of them, too, what a device holds is not brought again.
+    /// The samples of slots as a 3-D texture: slots that a device holds are not brought again.
     Texture(&'a Slots),
 }
 
@@ -105,7 +105,7 @@ impl Resource {
 }
 
 impl FramePlan {
-    /// What the plan brings for a resource; `None` for what it does not have, and for what backends bring themselves: the frame's
+    /// The content of a resource; `None` if the plan does not have it, and for resources that backends fill themselves: the frame's
     /// numbers (they depend on the atlas and the pass), pictures, inputs and results.
     pub fn content(&self, resource: Resource) -> Option<Content<'_>> {
         let bytes = |bytes: &[u8]| Some(Content::Bytes(Cow::Owned(bytes.to_vec())));

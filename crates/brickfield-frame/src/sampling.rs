@@ -4,7 +4,7 @@ use brickfield_optics::QuadratureRule;
 
 /// How a ray is sampled: how long its segments are, which rule integrates them, and whether shortcuts are allowed.
 ///
-/// Segment k lies between surfaces k and k + 1 of the rays' [`Placement`](crate::Placement), cut to what is divided
+/// Segment k lies between surfaces k and k + 1 of the rays' [`Placement`](crate::Placement), cut to the divided span
 /// ([`Division`]); the rule's nodes lie in the cut segment, which has its true length. [`Lengths::Nominal`] is the exception.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
@@ -15,7 +15,7 @@ pub struct Sampling {
     lengths: Lengths,
 }
 
-/// What is divided into segments.
+/// The span that is divided into segments.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Division {
     /// A ray's way through the domain: all its segments are as long, whichever bricks they cross.
@@ -32,7 +32,7 @@ pub enum Lengths {
     #[default]
     True,
     /// The step (2^level steps for [`Division::Brick`]), whatever the ray's angle: LaMar's own form, to show what it costs.
-    /// A segment counts as a whole if its middle lies in what is divided, and else not at all. One-node rules only.
+    /// A segment counts as a whole if its middle lies in the divided span, and else not at all. One-node rules only.
     Nominal,
 }
 
@@ -127,7 +127,7 @@ impl Sampling {
         self.mode
     }
 
-    /// What is divided into segments.
+    /// The span that is divided into segments.
     pub fn division(&self) -> Division {
         self.division
     }

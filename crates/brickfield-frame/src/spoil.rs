@@ -10,7 +10,7 @@ use crate::{
     Sampling, Slots,
 };
 
-/// A plan taken apart. What is put together again is not validated: it may be wrong in any way.
+/// A plan taken apart. It is put together again without validation: the plan may be wrong in any way.
 #[derive(Clone, Debug)]
 #[allow(missing_docs)]
 pub struct SpoiltPlan {

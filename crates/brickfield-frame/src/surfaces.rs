@@ -13,7 +13,7 @@ pub enum Placement {
     /// Spheres around the eye, a step apart on every ray. For parallel rays: planes.
     #[default]
     Shells,
-    /// Those spheres as triangles: the picture's squares of so many pixels a side, cut along their falling diagonals, with
+    /// The same spheres as triangles: the picture's squares of so many pixels a side, cut along their falling diagonals, with
     /// their corners on the sphere.
     #[allow(missing_docs)]
     TessellatedShells { facet_pixels: u32 },
@@ -27,10 +27,10 @@ pub enum Placement {
 /// How many voxels before the volume the first plane of a stack lies. From there no plane of whole or half voxels, and no middle
 /// between two, at any level, lies on a brick's face, where rounding would decide which brick has it.
 const BEFORE: f64 = 1.0 / 6.0;
-/// What the cosines to x, y and z are multiplied by before they are compared.
+/// Factors of the cosines to x, y and z before they are compared: a tie goes to x, then y.
 pub(crate) const PREFERENCE: DVec3 = DVec3::new(1.0, 1.0 - 1.0 / 4096.0, 1.0 - 2.0 / 4096.0);
 
-/// What makes the surfaces of a frame.
+/// The parameters of the surfaces of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steps {
     /// Distance between surfaces, in world units.
@@ -43,7 +43,7 @@ pub struct Steps {
 /// Three stacks of planes, a step apart in the world: of constant x, y, z in sample space.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PlaneStacks {
-    /// Distance between two planes a voxel apart, in world units: what a direction in voxels per world unit is multiplied by
+    /// Distance between two planes a voxel apart, in world units: the factor of a direction in voxels per world unit
     /// to give the cosines of its angles to the planes' normals.
     pub voxel_world: DVec3,
     /// The first planes that rays towards greater x, y, z meet; relative to the frame's centre.

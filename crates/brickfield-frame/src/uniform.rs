@@ -8,7 +8,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::{AtlasShape, FramePlan, Pass};
 
-/// The frame's uniform block: vectors of three, each followed by a number that has nothing to do with it. Positions are in
+/// The frame's uniform block: vectors of three, each followed by an unrelated number. Positions are in
 /// sample space relative to `RayFrame::center`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -45,11 +45,11 @@ pub struct FrameUniforms {
     pub domain_max: [f32; 3],
     /// Offset of the same.
     pub sample_offset: f32,
-    /// Lower corner of what is visible.
+    /// Lower corner of the visible box.
     pub visible_min: [f32; 3],
     /// Samples of level 0 along an index cell's side.
     pub cell_samples: f32,
-    /// Upper corner of what is visible.
+    /// Upper corner of the visible box.
     pub visible_max: [f32; 3],
     /// First segment of the pass.
     pub first_segment: f32,

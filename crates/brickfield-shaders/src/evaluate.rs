@@ -14,7 +14,7 @@ pub fn shader_inputs(plan: &FramePlan, function: ShaderFunction, inputs: &[[f32;
     inputs.iter().map(|x| std::array::from_fn(|i| if i < n_values { number(x[i]) } else { x[i] })).collect()
 }
 
-/// The outputs of a function as callers expect them, from what a shader returned.
+/// The outputs of a function as callers expect them, from a shader's outputs.
 pub fn shader_outputs(plan: &FramePlan, function: ShaderFunction, outputs: &[[f32; 4]]) -> Vec<[f32; 4]> {
     let values = plan.value_scale();
     let absolute = |x: &[f32; 4]| match function {

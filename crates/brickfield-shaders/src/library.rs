@@ -130,7 +130,7 @@ impl ShaderLibrary {
         Ok(library)
     }
 
-    /// The WGSL text of a variant: what it needs, and nothing else.
+    /// The WGSL text of a variant: the declarations that it needs, and nothing else.
     pub(crate) fn wgsl(&self, variant: &Variant) -> Result<String, ShaderError> {
         let mut resolver = VirtualResolver::new();
         let chosen = variant.chosen_modules();

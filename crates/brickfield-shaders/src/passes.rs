@@ -9,7 +9,7 @@ use crate::KnotSearch;
 const MOST_ROUNDS: f64 = 65_535.0;
 /// Most segments that are added up one by one: the rounding errors of longer sums would show.
 const MOST_SEGMENTS: f64 = 8192.0;
-/// Most nodes in one dispatch: about a second on a slow device, whose driver may end what takes longer.
+/// Most nodes in one dispatch: about a second on a slow device, whose driver may end a longer dispatch.
 const MOST_NODES: f64 = (1u32 << 28) as f64;
 
 /// The dispatches of a plan's frame, in order; rows are cut at multiples of `group_height`.
@@ -47,8 +47,8 @@ fn segments_per_pass(plan: &FramePlan) -> f64 {
     (rounds / rounds_per_segment(plan)).min(MOST_SEGMENTS).floor().max(1.0)
 }
 
-/// How often the loops go round for the bricks that a ray crosses, in every pass: once for each, for what earlier passes saw of
-/// it, and for the two segments that its faces cut.
+/// How often the loops go round for the bricks that a ray crosses, in every pass: once for each, once to pass the segments of earlier passes in
+/// it, and twice for the segments that its faces cut.
 fn rounds_of_bricks(plan: &FramePlan) -> f64 {
     match plan.sampling().division() {
         Division::Ray => 0.0,

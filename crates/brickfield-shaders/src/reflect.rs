@@ -1,4 +1,4 @@
-//! What is left in a module: the resources that a backend must bind.
+//! The resources that are left in a module, which a backend must bind.
 
 use brickfield_frame::Resource;
 use naga::{AddressSpace, GlobalVariable, ImageClass, ImageDimension, Module, StorageAccess, StorageFormat, TypeInner};
@@ -8,13 +8,13 @@ use naga::{AddressSpace, GlobalVariable, ImageClass, ImageDimension, Module, Sto
 pub struct Binding {
     /// Its binding number.
     pub index: u32,
-    /// What is to be bound, by its name in the shader.
+    /// The resource, by its name in the shader.
     pub resource: Resource,
-    /// As what it is bound.
+    /// The kind of its binding.
     pub kind: BindingKind,
 }
 
-/// As what a resource is bound.
+/// The kinds of bindings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum BindingKind {
     /// A uniform buffer ([`brickfield_frame::FrameUniforms`]).

@@ -18,11 +18,11 @@ pub struct Specialised {
     pub variant: Variant,
     /// The module; both backends are fed this one.
     pub module: Module,
-    /// What validation found out about it.
+    /// The module's properties, as validation found them.
     pub info: ModuleInfo,
     /// The text it was parsed from.
     pub wgsl: String,
-    /// What is to be bound in group 0, ascending.
+    /// The bindings of group 0, ascending.
     pub bindings: Vec<Binding>,
     /// Invocations along x, y, z of a workgroup; 0 where polygons are shaded.
     pub workgroup_size: [u32; 3],
@@ -88,7 +88,7 @@ pub fn specialise(variant: &Variant) -> Result<Specialised, ShaderError> {
 impl ShaderLibrary {
     /// Compiles, validates and compacts a variant.
     ///
-    /// What the variant does not need goes by WESL's conditions, before parsing; naga's compaction then drops the types,
+    /// WESL's conditions leave out declarations that the variant does not need, before parsing; naga's compaction then drops the types,
     /// constants and resources that nothing refers to any more. A few milliseconds.
     ///
     /// # Errors

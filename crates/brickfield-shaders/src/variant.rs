@@ -6,7 +6,7 @@ use brickfield_frame::{
 
 use crate::passes::has_long_rays;
 
-/// One shader of the family: what is compiled in. A key for pipeline caches.
+/// One shader of the family, by the choices that are compiled in. A key for pipeline caches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct Variant {
@@ -18,7 +18,7 @@ pub struct Variant {
     pub field: FieldKind,
     /// How segments are integrated.
     pub rule: QuadratureRule,
-    /// Between which surfaces segments lie, of what, and for which lengths they count.
+    /// The segments: their surfaces, the division, and the lengths that they count for.
     pub segments: Segments,
     /// How knots are searched.
     pub search: KnotSearch,
@@ -26,7 +26,7 @@ pub struct Variant {
     pub long_rays: bool,
     /// Texture reads of 16-bit samples are turned back into integers, of which f32 keeps all digits.
     pub integer_samples: bool,
-    /// What is run.
+    /// The entry point.
     pub entry: Entry,
 }
 
@@ -161,7 +161,7 @@ impl KnotSearch {
     }
 }
 
-/// What a shader does.
+/// The task of a shader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Entry {
     /// Renders the picture by casting rays.
@@ -235,7 +235,7 @@ impl Variant {
         }
     }
 
-    /// Of modules that share a path, those that are compiled.
+    /// The modules that are compiled, one for each path that several modules share.
     pub(crate) fn chosen_modules(self) -> [&'static str; 2] {
         let integrate = match self.segments.division {
             Division::Brick => "integrate/bricks",

@@ -98,13 +98,13 @@ pub struct FunctionTest {
     /// The function.
     pub function: ShaderFunction,
     /// Inputs, each with its answer.
-    pub points: Vec<Point>,
+    pub points: Vec<FunctionPoint>,
 }
 
 /// An input, its answer, and how far each channel may be off.
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
-pub struct Point {
+pub struct FunctionPoint {
     pub input: [f32; 4],
     pub expected: [f64; 4],
     pub tolerance: [f64; 4],

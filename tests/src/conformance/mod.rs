@@ -27,7 +27,7 @@ mod surfaces;
 
 pub use ahead::for_each_prepared;
 pub use candidate::Candidate;
-pub use case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, PictureTest, Plans, Point, Shows};
+pub use case::{Case, Check, FunctionPoint, FunctionTest, Mutant, NoData, Oracle, PictureTest, Plans, Shows};
 pub use cases::all as cases;
 pub use check::{Judged, Obstacle, Prepared};
 pub use outcome::{Outcome, Status, Summary};

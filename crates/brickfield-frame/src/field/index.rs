@@ -35,7 +35,7 @@ impl Reach {
     }
 }
 
-/// What a cell of the index says: a slot, or nothing visible; and how far that answer reaches.
+/// The entry of an index cell: a slot, or empty; and how far that answer reaches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IndexEntry {
     /// The block's samples are in this slot of [`Slots`](crate::Slots).
@@ -182,7 +182,7 @@ impl IndexGrid {
         index
     }
 
-    /// The index, which keeps the identity of what is equal in the one before it: a device brings the rest only.
+    /// The index, whose pages keep their identity where they are equal to pages of the index before it: a device is brought the others.
     #[must_use]
     pub fn following(mut self, before: &IndexGrid) -> IndexGrid {
         if self == *before {

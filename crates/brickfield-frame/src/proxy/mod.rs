@@ -22,7 +22,7 @@ use surfaces::{Outline, outlines};
 /// brick are polygons, too, of the segments that end with the brick. So every segment of every ray is one fragment. (With
 /// [`Lengths::Nominal`] polygons are the segments' middles, and faces none.)
 ///
-/// Polygons are projected, and grown by an eighth of a pixel and by what f32 may put a ray beside its pixel
+/// Polygons are projected, and grown by an eighth of a pixel and by the distance that f32 may put a ray beside its pixel
 /// ([`RayFrame::rounding`](crate::RayFrame::rounding)): which fragments count is decided by the shader from the ray; rasterisers round corners to 1/256 of a
 /// pixel.
 #[derive(Clone, Debug)]
@@ -36,13 +36,13 @@ pub struct ProxyGeometry {
     id: ContentId,
 }
 
-/// What polygons are blended into.
+/// The pixel format that polygons are blended into.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Target {
     /// Four floats of 32 bits.
     #[default]
     Float32,
-    /// Four floats of 16 bits: half the memory; what is blended is rounded to 11 bits at every fragment.
+    /// Four floats of 16 bits: half the memory; the sum is rounded to 11 bits at every fragment.
     Float16,
 }
 
@@ -56,7 +56,7 @@ pub struct ProxyCorner {
     pub surface: f32,
     /// Place in [`ProxyGeometry::bricks`].
     pub brick: u32,
-    /// What else a ray must meet for its fragment to count: the facet or stack of planes that the surface belongs to; the exit
+    /// The part that a ray must meet, too, for its fragment to count: the facet or stack of planes that the surface belongs to; the exit
     /// itself, twice its axis, plus one for the upper face.
     pub owner: u32,
 }
@@ -97,7 +97,7 @@ impl Target {
     }
 }
 
-/// Most fragments in a batch, about: what a device does at a time.
+/// Most fragments in a batch, about.
 const BATCH_FRAGMENTS: f64 = (1u32 << 24) as f64;
 
 impl ProxyGeometry {
@@ -165,7 +165,7 @@ impl ProxyGeometry {
         self.id
     }
 
-    /// What the polygons are blended into.
+    /// The pixel format that the polygons are blended into.
     pub fn target(&self) -> Target {
         self.target
     }

@@ -5,7 +5,7 @@ use brickfield_core::glam::{DMat3, DVec2, DVec3};
 use super::polygon::{clip, hull};
 use crate::{FramePlan, RayFrame};
 
-/// Nearer to the eye's plane than this share of what f32 rounds, nothing is drawn.
+/// Nothing is drawn nearer to the eye's plane than this share of the rounding of f32.
 const NEAR: f64 = 1e-4;
 /// By how many pixels polygons are grown: more than rasterisers round.
 pub(super) const GROWN: f64 = 0.125;
@@ -68,11 +68,11 @@ impl<'a> Projector<'a> {
         if self.rays.pixel == 0.0 { self.rays.anchor_past_start + self.rays.start } else { 0.0 }
     }
 
-    /// All of a window, in pixels, whose rays may meet a polygon: a little more than where it is seen. What lies nearer to the
+    /// The part of a window, in pixels, whose rays may meet a polygon: a little more than where it is seen. The part nearer to the
     /// eye's plane than [`NEAR`] of rounding is left out.
     ///
     /// A ray that f32 puts beside its pixel p by d meets the polygon in a point x that is seen at p + (d.xy - p d.z) / x.z. That is
-    /// affine in 1 / x.z, which is affine in the picture: the hull of what its corners may be off by has all of them.
+    /// affine in 1 / x.z, which is affine in the picture: the hull of the offsets of its corners holds all of them.
     pub(super) fn project(&self, polygon: &[DVec3], window: Window) -> Vec<DVec2> {
         let (half, off) = (0.5 * self.rays.size.as_dvec2(), self.camera_rounding);
         let is_parallel = self.rays.pixel == 0.0;

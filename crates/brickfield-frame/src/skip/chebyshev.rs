@@ -7,7 +7,7 @@ const FEW_ROWS: usize = 512;
 
 /// Turns 0 and `farthest` into the distance of each cell to the nearest 0, no farther than `farthest`; x fastest.
 ///
-/// Along x; then the greater of what that found and the way along y; then z.
+/// One axis after the other: along x; then the greater of that distance and the way along y; then z.
 pub(crate) fn spread(cells: &mut [u8], [nx, ny, nz]: [usize; 3], farthest: u8) {
     cells.par_chunks_mut(nx).with_min_len(FEW_ROWS).for_each(along_row);
     for (stride, n) in [(1, ny), (ny, nz)] {
@@ -39,7 +39,7 @@ fn along_row(row: &mut [u8]) {
     row.iter_mut().rev().for_each(|d| closer(&mut last, d));
 }
 
-/// What a row `way` rows away says of this one.
+/// Distances of a row, as far as a row `way` rows away bounds them.
 fn nearer(out: &mut [u8], other: &[u8], way: u8) {
     out.iter_mut().zip(other).for_each(|(d, o)| *d = (*d).min((*o).max(way)));
 }

@@ -1,11 +1,11 @@
-//! All that is known to be dark in a field.
+//! The regions of a field that are known to be dark.
 
 use std::sync::Arc;
 
 use super::{Occupancy, Overview};
 use crate::{Chunked, ContentId, Field};
 
-/// What is known to be dark in a field under a transfer function; shared between frames. To leave it out changes no sample.
+/// The regions of a field that are dark under a transfer function; shared between frames. To leave them out changes no sample.
 #[derive(Clone, Debug, Default)]
 pub struct DarkRegions {
     /// Index and slots of the field that it was made for.
@@ -14,7 +14,7 @@ pub struct DarkRegions {
     overview: Option<Arc<Overview>>,
 }
 
-/// An occupancy that is not the field's.
+/// An occupancy of another field.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)]
@@ -26,7 +26,7 @@ pub enum DarkError {
 }
 
 impl DarkRegions {
-    /// What is dark of a field: the empty blocks of its index, and the macrocells that are known to be dark; with an overview
+    /// The dark regions of a field: the empty blocks of its index, and the macrocells that are known to be dark; with an overview
     /// of both for evenly placed bricks.
     ///
     /// Cost: some milliseconds for the overview.
@@ -53,7 +53,7 @@ impl DarkRegions {
         Ok(DarkRegions { of, occupancy, overview })
     }
 
-    /// Whether it was made for this field; nothing is dark in any.
+    /// Whether the regions are of this field. The default, without any region, is of every field.
     pub fn is_of(&self, field: &Field) -> bool {
         self.of.is_none_or(|of| of == DarkRegions::key(field))
     }
@@ -63,7 +63,7 @@ impl DarkRegions {
         self.occupancy.as_ref()
     }
 
-    /// The whole field at a glance, if anything is known to be dark.
+    /// The distances over the whole field, if anything is known to be dark.
     pub fn overview(&self) -> Option<&Arc<Overview>> {
         self.overview.as_ref()
     }

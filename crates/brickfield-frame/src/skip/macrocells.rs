@@ -1,4 +1,4 @@
-//! The ranges of the macrocells of a brick, and what a transfer function shows of them.
+//! The ranges of the macrocells of a brick, and which of them are visible under a transfer function.
 
 use brickfield_core::{BrickSide, TransferFunction, ValueRange};
 
@@ -35,7 +35,7 @@ impl MacrocellRanges {
         MacrocellRanges { side, stored }
     }
 
-    /// How far each macrocell is from the nearest that a transfer function shows otherwise.
+    /// How far each macrocell is from the nearest one of the other kind, visible or dark, under a transfer function.
     pub fn distances(&self, decode: Decode, transfer: &TransferFunction) -> Chunk {
         let visible = match &self.stored {
             StoredRanges::Unorm8(ranges) => visible(ranges, SampleFormat::Unorm8, decode, transfer),
@@ -80,7 +80,7 @@ fn of_brick<T: Copy + PartialOrd>(samples: &[T], n: usize, out: &mut [[T; 2]]) {
     let n_macrocells = n / side;
     let mut row = Vec::with_capacity(n);
     for (i, out) in out.chunks_exact_mut(n_macrocells).enumerate() {
-        // What all rows of samples that this row of macrocells touches hold, place by place.
+        // The range over all rows of samples that this row of macrocells touches, sample by sample.
         let rows = within(i / n_macrocells).flat_map(|z| within(i % n_macrocells).map(move |y| (z * n + y) * n));
         let rows = rows.map(|first| &samples[first..first + n]);
         row.clear();

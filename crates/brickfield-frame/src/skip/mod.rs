@@ -1,4 +1,4 @@
-//! What rays need not look at.
+//! The dark regions of a field, which rays pass over.
 
 mod beams;
 mod chebyshev;

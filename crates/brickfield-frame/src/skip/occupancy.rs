@@ -1,4 +1,4 @@
-//! Which parts of bricks may show, so that rays leap over the rest.
+//! Which macrocells of bricks are visible, so that rays leap over the dark ones.
 
 use std::sync::Arc;
 
@@ -10,12 +10,12 @@ use crate::{Chunk, Chunked, ContentId};
 /// Cells along a macrocell's side, whatever the brick's level: 8^3 macrocells in a brick of 16^3 samples, 32^3 in one of 64^3.
 pub const MACROCELL_SIDE: u32 = 2;
 
-/// How far each macrocell of each brick is from the nearest one of its brick that is not like it, visible or dark: in
+/// How far each macrocell of each brick is from the nearest one of its brick of the other kind, visible or dark: in
 /// macrocells along the axis on which they are farthest apart (Chebyshev; the distance maps of Deakin and Knoll 2019).
 ///
 /// d > 0: all macrocells of the brick less than d away are dark, that is, the transfer function is 0 over the range of their
-/// samples, so that passing over them changes no sample. d < 0: all less than -d away are visible, so that nobody need look
-/// again there. No distance is 0; in a brick of one kind all are as far as the brick is wide.
+/// samples, so that passing over them changes no sample. d < 0: all less than -d away are visible, so that no ray looks
+/// again there. No distance is 0; in a brick of one kind each distance is the brick's width.
 #[derive(Clone, Debug)]
 pub struct Occupancy {
     side: BrickSide,
@@ -48,7 +48,7 @@ impl Occupancy {
         Occupancy::n_macrocells_total(side) as u64 * n_bricks as u64 <= 1 << 27
     }
 
-    /// The distances in one brick, of which it is known what is visible: macrocell after macrocell, x fastest.
+    /// The distances in one brick, from the visibility of each macrocell: macrocell after macrocell, x fastest.
     ///
     /// # Panics
     /// If there are not as many macrocells as in a brick.

@@ -39,7 +39,7 @@ impl Beams {
         if plan.rays().placement != Placement::Shells || plan.sampling().division() == Division::Brick {
             return None;
         }
-        // Between levels, what is dark need not be connected: a pre-integrated segment could cross something visible.
+        // Between levels, dark regions need not be connected: a pre-integrated segment could cross a visible one.
         if plan.sampling().rule() == QuadratureRule::PreIntegrated && plan.field().has_several_levels() {
             return None;
         }

@@ -13,7 +13,7 @@ const MAX_CELLS: usize = 1 << 21;
 const FARTHEST: u8 = 32;
 
 /// Where a whole cut is dark: a lattice over the volume, whose cells are the macrocells of bricks of level 0, or 2^m of them
-/// along each axis where those are more than 128^3.
+/// along each axis where the volume has more than 128^3 macrocells.
 ///
 /// Each cell has its Chebyshev distance, in cells, to the nearest that may show something, whatever brick that is in.
 #[derive(Clone, Debug)]
@@ -78,7 +78,7 @@ pub(super) struct Region {
 }
 
 impl Overview {
-    /// The overview of an index of bricks and what is known of their macrocells; `None` if nothing is known to be dark.
+    /// The overview of an index of bricks and of their macrocells; `None` if nothing is known to be dark.
     pub fn of(side: BrickSide, index: &IndexGrid, occupancy: Option<&Occupancy>) -> Option<Overview> {
         if occupancy.is_none() && !index.has_empty() {
             return None;
@@ -147,7 +147,7 @@ impl Overview {
         }
     }
 
-    /// Marks what overlaps the samples from `low` to `high`, as far as the lattice reaches.
+    /// Marks the cells that overlap the samples from `low` to `high`, as far as the lattice extends.
     fn mark_box(&mut self, low: UVec3, high: UVec3) {
         let cell = |v: UVec3| UVec3::from(v.to_array().map(|s| self.lattice.cell(s)));
         let high = (cell(high - 1) + 1).min(self.n_cells);
