@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use ash::vk;
 use brickfield_core::glam::UVec3;
-use brickfield_frame::{AtlasShape, Chunked, HeldChunks, Places, RenderError, SampleFormat, Slots};
+use brickfield_frame::{
+    AtlasShape, Chunked, HeldChunks, RenderError, Room, RoomChange, SampleFormat, Slots, TextureShape,
+};
 
 use crate::staging::Staging;
 use crate::vulkan::{Device, ImageBox, Queue, Use, VulkanImage, vulkan_format};
@@ -12,21 +14,11 @@ use crate::vulkan::{Device, ImageBox, Queue, Use, VulkanImage, vulkan_format};
 /// A texture that holds slots.
 pub(crate) struct Texture {
     image: VulkanImage,
-    shape: SlotShape,
+    shape: TextureShape,
     format: SampleFormat,
     held: HeldChunks,
 }
 
-/// How slots lie in it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum SlotShape {
-    Atlas(AtlasShape),
-    /// As the table of their places says.
-    Table(UVec3),
-}
-
-/// An atlas with so many times the room that slots need is replaced by a smaller one.
-const TOO_LARGE: u32 = 8;
 /// Slots lie in staging memory at multiples of so many bytes.
 const ALIGNMENT: usize = 16;
 
@@ -41,47 +33,24 @@ impl Texture {
     ) -> Result<Texture, RenderError> {
         check_format(device, slots.format(), filtered)?;
         let limit = device.physical().limits.max_image_dimension3_d;
-        let old = old.filter(|old| old.format == slots.format());
-        let mut empty = |shape| Texture::empty(device, queue, shape, slots.format());
-        match (slots.places(), old) {
-            (_, Some(old)) if old.held.has_all(slots) => Ok(old),
-            (Places::Table { texels, .. }, Some(old)) if old.shape == SlotShape::Table(*texels) => Ok(old),
-            (Places::Table { texels, .. }, old) => {
+        let mut old = old.filter(|old| old.format == slots.format());
+        if let Some(old) = old.take_if(|old| old.held.has_all(slots)) {
+            return Ok(old);
+        }
+        let room = slots.room(old.as_ref().map(|old| old.shape), limit)?;
+        match (room, old) {
+            (Room { change: RoomChange::Keep, .. }, Some(old)) => Ok(old),
+            (Room { change: RoomChange::Grow, shape }, Some(old)) => old.grown(device, queue, shape),
+            (Room { shape, .. }, old) => {
                 drop(old);
-                match texels.max_element() <= limit {
-                    true => empty(SlotShape::Table(*texels)),
-                    false => Err(RenderError::TextureTooLarge { texels: *texels, limit }),
-                }
-            }
-            (Places::Even(side), old) => {
-                let needed = slots.n_slots();
-                let old = old.and_then(|old| Some((old.atlas_shape().filter(|s| s.side == *side)?, old)));
-                let too_large = RenderError::AtlasTooLarge { n_bricks: needed, side: side.n_samples(), limit };
-                let least = slots.atlas(limit).ok_or(too_large)?;
-                match old {
-                    Some((shape, old)) if shape.n_bricks() >= needed && shape.n_bricks() / TOO_LARGE <= needed => {
-                        Ok(old)
-                    }
-                    Some((shape, old)) if shape.n_bricks() < needed => match shape.grown(needed, limit) {
-                        Some(grown) => old.grown(device, queue, grown),
-                        None => empty(SlotShape::Atlas(least)),
-                    },
-                    old => {
-                        // Both may not fit the device.
-                        drop(old);
-                        empty(SlotShape::Atlas(least))
-                    }
-                }
+                Texture::empty(device, queue, shape, slots.format())
             }
         }
     }
 
     /// How bricks lie in it.
     pub(crate) fn atlas_shape(&self) -> Option<AtlasShape> {
-        match self.shape {
-            SlotShape::Atlas(shape) => Some(shape),
-            SlotShape::Table(_) => None,
-        }
+        self.shape.atlas()
     }
 
     /// The image that shaders read.
@@ -93,7 +62,7 @@ impl Texture {
     fn empty(
         device: &Arc<Device>,
         queue: &mut Queue,
-        shape: SlotShape,
+        shape: TextureShape,
         format: SampleFormat,
     ) -> Result<Texture, RenderError> {
         let image = VulkanImage::texture_3d(device, format, shape.texels())?;
@@ -106,12 +75,12 @@ impl Texture {
     }
 
     /// A larger atlas with this one's bricks at their places; without them if both do not fit the device.
-    fn grown(self, device: &Arc<Device>, queue: &mut Queue, shape: AtlasShape) -> Result<Texture, RenderError> {
-        let larger = match Texture::empty(device, queue, SlotShape::Atlas(shape), self.format) {
+    fn grown(self, device: &Arc<Device>, queue: &mut Queue, shape: TextureShape) -> Result<Texture, RenderError> {
+        let larger = match Texture::empty(device, queue, shape, self.format) {
             Err(RenderError::OutOfMemory { .. }) => {
                 let format = self.format;
                 drop(self);
-                return Texture::empty(device, queue, SlotShape::Atlas(shape), format);
+                return Texture::empty(device, queue, shape, format);
             }
             larger => larger?,
         };
@@ -169,21 +138,8 @@ impl Texture {
 
     /// From a slot's place in staging memory to its place in the texture.
     fn place(&self, slots: &Slots, slot: u32, buffer_offset: u64) -> ImageBox {
-        let (origin, extent) = match (self.shape, slots.places()) {
-            (_, Places::Table { places, .. }) => (places[slot as usize].texel, places[slot as usize].n),
-            (SlotShape::Atlas(shape), Places::Even(side)) => (shape.origin(slot), UVec3::splat(side.n_samples())),
-            (SlotShape::Table(_), Places::Even(side)) => (UVec3::ZERO, UVec3::splat(side.n_samples())),
-        };
+        let (origin, extent) = self.shape.texels_of(slots, slot);
         ImageBox { buffer_offset, origin, extent }
-    }
-}
-
-impl SlotShape {
-    fn texels(self) -> UVec3 {
-        match self {
-            SlotShape::Atlas(shape) => shape.texels(),
-            SlotShape::Table(texels) => texels,
-        }
     }
 }
 

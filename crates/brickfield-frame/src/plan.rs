@@ -28,7 +28,7 @@ pub struct FramePlan {
     pub(crate) features: FeatureSet,
 }
 
-/// The parts of a plan, from which all else follows.
+/// The parts of a plan, from which all else follows. [`new`](Self::new) fills in the parts that a frame may do without.
 #[derive(Clone, Debug)]
 pub struct PlanParts {
     /// A value for every position.
@@ -47,8 +47,23 @@ pub struct PlanParts {
     pub drawing: Drawing,
 }
 
+impl PlanParts {
+    /// Parts for rays that look at everything.
+    pub fn new(
+        field: Field,
+        rays: RayFrame,
+        domain: Aabb,
+        sampling: Sampling,
+        transfer: TransferFunction,
+    ) -> PlanParts {
+        let (dark, drawing) = (DarkRegions::default(), Drawing::Rays);
+        PlanParts { field, rays, domain, sampling, transfer, dark, drawing }
+    }
+}
+
 /// How backends that can do both make a picture.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub enum Drawing {
     /// Rays are cast, front to back.
     #[default]

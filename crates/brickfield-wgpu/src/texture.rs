@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use brickfield_core::glam::UVec3;
-use brickfield_frame::{AtlasShape, HeldChunks, Places, RenderError, Resource, SampleFormat, Slots};
+use brickfield_frame::{
+    AtlasShape, HeldChunks, RenderError, Resource, Room, RoomChange, SampleFormat, Slots, TextureShape,
+};
 use wgpu::{Features, TextureFormat};
 
 use crate::device::Device;
@@ -13,23 +15,13 @@ use crate::device::Device;
 pub(crate) struct Texture {
     texture: wgpu::Texture,
     pub(crate) view: wgpu::TextureView,
-    shape: SlotShape,
+    shape: TextureShape,
     format: SampleFormat,
     held: HeldChunks,
 }
 
-/// How slots lie in it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum SlotShape {
-    Atlas(AtlasShape),
-    /// As the table of their places says.
-    Table(UVec3),
-}
-
 /// Bytes that are handed over before the device may go on with them.
 const BYTES_AT_ONCE: usize = 64 << 20;
-/// An atlas with so many times the room that slots need is replaced by a smaller one.
-const TOO_LARGE: u32 = 8;
 
 impl Texture {
     /// Brings slots to the device, as far as they are not there; the bytes that were brought.
@@ -51,42 +43,25 @@ impl Texture {
 
     /// How bricks lie in it.
     pub(crate) fn atlas_shape(&self) -> Option<AtlasShape> {
-        match self.shape {
-            SlotShape::Atlas(shape) => Some(shape),
-            SlotShape::Table(_) => None,
-        }
+        self.shape.atlas()
     }
 
     /// A texture with room for slots: the old one, or one to which its contents are copied, or an empty one.
     fn with_room(device: &Device, slots: &Slots, old: Option<Texture>) -> Result<Texture, RenderError> {
         let limit = device.description.capabilities.max_texture_3d;
         let old = old.filter(|old| old.format == slots.format());
-        match (slots.places(), old) {
-            (Places::Table { texels, .. }, Some(old)) if old.shape == SlotShape::Table(*texels) => Ok(old),
-            (Places::Table { texels, .. }, _) => match texels.max_element() <= limit {
-                true => Texture::empty(device, SlotShape::Table(*texels), slots.format()),
-                false => Err(RenderError::TextureTooLarge { texels: *texels, limit }),
-            },
-            (Places::Even(side), old) => {
-                let needed = slots.n_slots();
-                let old = old.and_then(|old| Some((old.atlas_shape().filter(|s| s.side == *side)?, old)));
-                let least = slots.atlas(limit);
-                let too_large = RenderError::AtlasTooLarge { n_bricks: needed, side: side.n_samples(), limit };
-                match old {
-                    Some((shape, old)) if shape.n_bricks() >= needed && shape.n_bricks() / TOO_LARGE <= needed => {
-                        Ok(old)
-                    }
-                    Some((shape, old)) if shape.n_bricks() < needed => match shape.grown(needed, limit) {
-                        Some(grown) => old.grown(device, grown),
-                        None => Texture::empty(device, SlotShape::Atlas(least.ok_or(too_large)?), slots.format()),
-                    },
-                    _ => Texture::empty(device, SlotShape::Atlas(least.ok_or(too_large)?), slots.format()),
-                }
+        let room = slots.room(old.as_ref().map(|old| old.shape), limit)?;
+        match (room, old) {
+            (Room { change: RoomChange::Keep, .. }, Some(old)) => Ok(old),
+            (Room { change: RoomChange::Grow, shape }, Some(old)) => old.grown(device, shape),
+            (Room { shape, .. }, old) => {
+                drop(old);
+                Texture::empty(device, shape, slots.format())
             }
         }
     }
 
-    fn empty(device: &Device, shape: SlotShape, format: SampleFormat) -> Result<Texture, RenderError> {
+    fn empty(device: &Device, shape: TextureShape, format: SampleFormat) -> Result<Texture, RenderError> {
         let texels = shape.texels();
         let n_bytes = texels.to_array().into_iter().map(u64::from).product::<u64>() * format.n_bytes() as u64;
         let stored = stored_as(device, format)?;
@@ -109,12 +84,12 @@ impl Texture {
     }
 
     /// A larger atlas with this one's bricks at their places; without them if both do not fit the device.
-    fn grown(self, device: &Device, shape: AtlasShape) -> Result<Texture, RenderError> {
-        let larger = match Texture::empty(device, SlotShape::Atlas(shape), self.format) {
+    fn grown(self, device: &Device, shape: TextureShape) -> Result<Texture, RenderError> {
+        let larger = match Texture::empty(device, shape, self.format) {
             Err(RenderError::OutOfMemory { .. }) => {
                 let format = self.format;
                 drop(self);
-                return Texture::empty(device, SlotShape::Atlas(shape), format);
+                return Texture::empty(device, shape, format);
             }
             larger => larger?,
         };
@@ -137,8 +112,8 @@ impl Texture {
         let mut n_bytes = 0;
         device.checked("the atlas's samples", 0, || {
             n_bytes = match self.shape {
-                SlotShape::Atlas(shape) => self.write_bricks(device, slots, shape, &missing),
-                SlotShape::Table(_) => missing.iter().map(|slot| self.write_slot(device, slots, *slot)).sum(),
+                TextureShape::Atlas(shape) => self.write_bricks(device, slots, shape, &missing),
+                TextureShape::Table(_) => missing.iter().map(|slot| self.write_slot(device, slots, *slot)).sum(),
             };
             device.queue.submit([]);
         })?;
@@ -169,11 +144,7 @@ impl Texture {
 
     fn write_slot(&self, device: &Device, slots: &Slots, slot: u32) -> u64 {
         let Some(samples) = slots.samples(slot) else { return 0 };
-        let (origin, size) = match (self.shape, slots.places()) {
-            (_, Places::Table { places, .. }) => (places[slot as usize].texel, places[slot as usize].n),
-            (SlotShape::Atlas(shape), _) => (shape.origin(slot), UVec3::splat(shape.side.n_samples())),
-            (SlotShape::Table(_), Places::Even(_)) => return 0,
-        };
+        let (origin, size) = self.shape.texels_of(slots, slot);
         self.write(device, samples.bytes(), origin, size);
         samples.bytes().len() as u64
     }
@@ -197,15 +168,6 @@ impl Texture {
             rows_per_image: Some(size.y),
         };
         device.queue.write_texture(to, bytes, layout, extent(size));
-    }
-}
-
-impl SlotShape {
-    fn texels(self) -> UVec3 {
-        match self {
-            SlotShape::Atlas(shape) => shape.texels(),
-            SlotShape::Table(texels) => texels,
-        }
     }
 }
 
@@ -261,7 +223,7 @@ mod tests {
         let bytes: Vec<u8> = (0..5).flat_map(brick).collect();
         let decode = Decode { scale: 255.0, offset: 0.0 };
         let slots = Slots::even(BrickSide::S16, SampleFormat::Unorm8, decode, &bytes).unwrap();
-        let shape = slots.atlas(64).unwrap();
+        let shape = slots.room(None, 64).unwrap().shape.atlas().unwrap();
         let texels = shape.texels();
         for slot in 0..5 {
             let o = shape.origin(slot);

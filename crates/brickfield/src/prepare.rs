@@ -141,8 +141,8 @@ fn plan_selection(
         (Skipping::On, Technique::RayCasting) => residency.dark(&scene.transfer),
         _ => DarkRegions::default(),
     };
-    let transfer = scene.transfer.clone();
-    Ok(FramePlan::new(PlanParts { field, rays, domain, sampling, transfer, dark, drawing })?)
+    let parts = PlanParts::new(field, rays, domain, sampling, scene.transfer.clone());
+    Ok(FramePlan::new(PlanParts { dark, drawing, ..parts })?)
 }
 
 /// An index cell of each brick, the farthest brick first.

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use brickfield::frame::{
-    AtlasShape, Chunk, DarkRegions, Drawing, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, Places,
-    PlanParts, Reach, SampleFormat, Slots,
+    AtlasShape, Chunk, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, Places, PlanParts, Reach,
+    SampleFormat, Slots,
 };
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Axes, BrickSide, Level, Place, Volume};
@@ -30,15 +30,7 @@ impl Storage {
             (Storage::Averages, Some(volume)) => averages(&plan, volume),
             (Storage::Placed | Storage::Averages, _) => placed(plan.field()),
         };
-        let parts = PlanParts {
-            field,
-            rays: *plan.rays(),
-            domain: *plan.domain(),
-            sampling: *plan.sampling(),
-            transfer: plan.transfer().clone(),
-            dark: DarkRegions::default(),
-            drawing: Drawing::Rays,
-        };
+        let parts = PlanParts::new(field, *plan.rays(), *plan.domain(), *plan.sampling(), plan.transfer().clone());
         FramePlan::new(parts).expect("the parts of a plan, but for its field")
     }
 }

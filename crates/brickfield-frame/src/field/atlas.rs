@@ -1,7 +1,10 @@
-//! Bricks of one size in a 3-D texture.
+//! Slots in a 3-D texture.
 
 use brickfield_core::BrickSide;
 use brickfield_core::glam::UVec3;
+
+use super::{Places, Slots};
+use crate::RenderError;
 
 /// How slots lie in a 3-D texture: slot s at (s mod x, s / x mod y, s / (x y)), in bricks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,6 +62,102 @@ impl AtlasShape {
     }
 }
 
+/// How slots lie in a 3-D texture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TextureShape {
+    /// Bricks of one size, by arithmetic.
+    Atlas(AtlasShape),
+    /// As the table of their places says, in so many texels.
+    Table(UVec3),
+}
+
+/// The texture that a device needs for slots, and how it comes by it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Room {
+    /// The texture's shape.
+    pub shape: TextureShape,
+    /// What happens to the texture that the device holds.
+    pub change: RoomChange,
+}
+
+/// What happens to the texture that a device holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RoomChange {
+    /// It has room, and stays.
+    Keep,
+    /// Its bricks move to a larger one, each to the same place.
+    Grow,
+    /// It goes before its successor is made: both may not fit the device.
+    Replace,
+}
+
+/// An atlas with so many times the room that slots need is replaced by a smaller one.
+const TOO_LARGE: u32 = 8;
+
+impl TextureShape {
+    /// The texture's size in texels.
+    pub fn texels(self) -> UVec3 {
+        match self {
+            TextureShape::Atlas(shape) => shape.texels(),
+            TextureShape::Table(texels) => texels,
+        }
+    }
+
+    /// The arithmetic of evenly placed bricks.
+    pub fn atlas(self) -> Option<AtlasShape> {
+        match self {
+            TextureShape::Atlas(shape) => Some(shape),
+            TextureShape::Table(_) => None,
+        }
+    }
+
+    /// Where a slot's texels lie: the first one, and their number along each axis.
+    pub fn texels_of(self, slots: &Slots, slot: u32) -> (UVec3, UVec3) {
+        match (slots.places(), self) {
+            (Places::Table { places, .. }, _) => (places[slot as usize].texel, places[slot as usize].n),
+            (Places::Even(side), TextureShape::Atlas(shape)) => (shape.origin(slot), UVec3::splat(side.n_samples())),
+            (Places::Even(side), TextureShape::Table(_)) => (UVec3::ZERO, UVec3::splat(side.n_samples())),
+        }
+    }
+}
+
+impl Slots {
+    /// The texture of at most `max_texels` a side that these slots need on a device that holds one of shape `held`, of the same
+    /// format.
+    ///
+    /// # Errors
+    /// If no such texture can hold them.
+    pub fn room(&self, held: Option<TextureShape>, max_texels: u32) -> Result<Room, RenderError> {
+        let side = match self.places() {
+            Places::Even(side) => *side,
+            Places::Table { texels, .. } if texels.max_element() > max_texels => {
+                return Err(RenderError::TextureTooLarge { texels: *texels, limit: max_texels });
+            }
+            Places::Table { texels, .. } => {
+                let shape = TextureShape::Table(*texels);
+                let change = if held == Some(shape) { RoomChange::Keep } else { RoomChange::Replace };
+                return Ok(Room { shape, change });
+            }
+        };
+        let n_bricks = self.n_slots();
+        let room = |shape, change| Ok(Room { shape: TextureShape::Atlas(shape), change });
+        let held = held.and_then(TextureShape::atlas).filter(|shape| shape.side == side);
+        match held {
+            Some(shape) if shape.n_bricks() >= n_bricks && shape.n_bricks() / TOO_LARGE <= n_bricks => {
+                return room(shape, RoomChange::Keep);
+            }
+            Some(shape) if shape.n_bricks() < n_bricks => {
+                if let Some(grown) = shape.grown(n_bricks, max_texels) {
+                    return room(grown, RoomChange::Grow);
+                }
+            }
+            _ => {}
+        }
+        let too_large = RenderError::AtlasTooLarge { n_bricks, side: side.n_samples(), limit: max_texels };
+        room(AtlasShape::fit(n_bricks, side, max_texels).ok_or(too_large)?, RoomChange::Replace)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -82,5 +181,20 @@ mod tests {
         assert!(grown.n_bricks() > atlas.n_bricks());
         assert!((0..atlas.n_bricks()).all(|slot| atlas.origin(slot) == grown.origin(slot)));
         assert_eq!(atlas.grown(1 << 20, 128), None);
+    }
+
+    #[test]
+    fn an_atlas_is_kept_grown_or_replaced() {
+        use crate::{Decode, SampleFormat};
+        let slots = |n: usize| {
+            let decode = Decode { scale: 1.0, offset: 0.0 };
+            Slots::even(BrickSide::S16, SampleFormat::Unorm8, decode, &vec![0; n * 4096]).unwrap()
+        };
+        let first = slots(9).room(None, 256).unwrap();
+        assert_eq!(first.change, RoomChange::Replace);
+        let after = |n| slots(n).room(Some(first.shape), 256).unwrap();
+        assert_eq!((after(9), after(2).change), (Room { change: RoomChange::Keep, ..first }, RoomChange::Keep));
+        assert_eq!((after(40).change, after(1).change), (RoomChange::Grow, RoomChange::Replace));
+        assert!(matches!(slots(9).room(None, 16), Err(RenderError::AtlasTooLarge { n_bricks: 9, .. })));
     }
 }

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, Level, Place};
 
-pub use atlas::AtlasShape;
+pub use atlas::{AtlasShape, Room, RoomChange, TextureShape};
 pub use index::{IndexEntry, IndexGrid, IndexLattice, Reach};
 pub use slots::{Decode, Places, SampleFormat, Slots, SlotsError};
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use brickfield_core::glam::UVec3;
 use brickfield_core::{BrickSide, Place, ScalarType, ValueRange};
 
-use crate::{AtlasShape, Chunk, Chunked, ContentId, PlaceUniform};
+use crate::{Chunk, Chunked, ContentId, PlaceUniform};
 
 /// How a sample is stored for a backend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -264,12 +264,6 @@ impl Slots {
             }
             SampleFormat::Float32 => 0.0,
         }
-    }
-
-    /// The smallest atlas of evenly placed bricks in a texture of at most `max_texels` a side; `None` if no such atlas can hold
-    /// them.
-    pub fn atlas(&self, max_texels: u32) -> Option<AtlasShape> {
-        AtlasShape::fit(self.n_slots(), self.brick_side()?, max_texels)
     }
 }
 
