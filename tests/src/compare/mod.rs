@@ -103,7 +103,7 @@ struct Found {
     seconds: f64,
 }
 
-/// The continuous answer, and what the report says of it.
+/// The continuous answer, and its lines in the report.
 fn answer(args: &CompareArgs, exhibit: &Exhibit, output: &Output) -> Result<(Image<f64>, ReferenceInfo), CompareError> {
     let (begin, scene) = (Instant::now(), &exhibit.scene);
     let spinner = ProgressBar::new_spinner().with_message("integrating the continuous answer");
