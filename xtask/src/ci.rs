@@ -21,11 +21,11 @@ const FRONT_DOOR: &str = "brickfield";
 /// A named check.
 struct Step {
     name: String,
-    run: Box<dyn FnOnce() -> Result<Outcome>>,
+    run: Box<dyn FnOnce() -> Result<StepOutcome>>,
 }
 
 /// What has become of a step.
-enum Outcome {
+enum StepOutcome {
     Held,
     Failed,
     /// The step needs something that is not to be had here. It counts as neither.
@@ -41,9 +41,9 @@ pub(crate) fn ci() -> Result<ExitCode> {
         let begin = Instant::now();
         let outcome = (step.run)().unwrap_or_else(|error| {
             eprintln!("ci: {error:#}");
-            Outcome::Failed
+            StepOutcome::Failed
         });
-        if let Outcome::Failed = outcome {
+        if let StepOutcome::Failed = outcome {
             all = ExitCode::FAILURE;
         }
         lines.push(format!("ci: {:<7} {:>6.1} s  {}", outcome.word(), begin.elapsed().as_secs_f64(), step.name));
@@ -62,8 +62,8 @@ fn steps() -> Result<Vec<Step>> {
         step("packages", package),
         step("dependencies", deny::packages),
         step("advisories", || match deny::has_database() {
-            true => deny::advisories().map(Outcome::from),
-            false => Ok(Outcome::NotChecked("not checked: no database")),
+            true => deny::advisories().map(StepOutcome::from),
+            false => Ok(StepOutcome::NotChecked("not checked: no database")),
         }),
         step("clippy", || {
             cargo("clippy").args(["--workspace", "--all-targets", "--all-features", "--", "--deny", "warnings"]).run()
@@ -109,31 +109,31 @@ fn readme_steps() -> Result<Vec<Step>> {
     Ok(promised.rev().collect())
 }
 
-fn step<R: Into<Outcome>>(name: &str, run: impl FnOnce() -> Result<R> + 'static) -> Step {
+fn step<R: Into<StepOutcome>>(name: &str, run: impl FnOnce() -> Result<R> + 'static) -> Step {
     Step { name: name.to_owned(), run: Box::new(|| run().map(Into::into)) }
 }
 
 /// A step that needs real volumes: `BRICKFIELD_DATA` names the folder.
 fn step_with_data(name: &str, run: impl FnOnce() -> Result<ExitCode> + 'static) -> Step {
     step(name, || match std::env::var_os("BRICKFIELD_DATA") {
-        Some(_) => run().map(Outcome::from),
-        None => Ok(Outcome::NotChecked("no data")),
+        Some(_) => run().map(StepOutcome::from),
+        None => Ok(StepOutcome::NotChecked("no data")),
     })
 }
 
-impl Outcome {
+impl StepOutcome {
     fn word(&self) -> &'static str {
         match self {
-            Outcome::Held => "ok",
-            Outcome::Failed => "FAILED",
-            Outcome::NotChecked(why) => why,
+            StepOutcome::Held => "ok",
+            StepOutcome::Failed => "FAILED",
+            StepOutcome::NotChecked(why) => why,
         }
     }
 }
 
-impl From<ExitCode> for Outcome {
-    fn from(code: ExitCode) -> Outcome {
-        if code == ExitCode::SUCCESS { Outcome::Held } else { Outcome::Failed }
+impl From<ExitCode> for StepOutcome {
+    fn from(code: ExitCode) -> StepOutcome {
+        if code == ExitCode::SUCCESS { StepOutcome::Held } else { StepOutcome::Failed }
     }
 }
 

@@ -23,7 +23,7 @@ use spawn::{Spawn, Tool, cargo};
 /// `cargo xtask compare --help` shows what can be chosen; so do those of conformance, gpu, orders and speed. They are built first.
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", after_help = ENVIRONMENT)]
-struct Options {
+struct Arguments {
     #[command(subcommand)]
     command: Command,
 }
@@ -95,7 +95,7 @@ impl Passed {
 }
 
 fn main() -> Result<ExitCode> {
-    match Options::parse().command {
+    match Arguments::parse().command {
         Command::Setup { yes } => setup::setup(if yes { setup::Consent::Given } else { setup::Consent::Ask }),
         Command::Compare(passed) => Tool::Compare.run(&passed.typed()),
         Command::Test(passed) => of_packages(cargo("test"), &passed.typed()),

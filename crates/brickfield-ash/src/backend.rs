@@ -16,7 +16,7 @@ use crate::polygons::{Polygons, reserve_canvas};
 use crate::resources::{Brought, Resources, missing};
 use crate::staging::Staging;
 use crate::variants::Variants;
-use crate::vulkan::{Bindable, Canvas, Device, Image, Instance, PhysicalDevice, Queue, Use, physical_devices};
+use crate::vulkan::{Bindable, Canvas, Device, Instance, PhysicalDevice, Queue, Use, VulkanImage, physical_devices};
 use crate::{ConnectError, Options, ValidationLog};
 
 /// Replays frame plans through Vulkan, without a window.
@@ -26,7 +26,7 @@ pub struct AshBackend {
     pub(crate) variants: Variants,
     pub(crate) resources: Resources,
     pub(crate) staging: Staging,
-    picture: Option<Image>,
+    picture: Option<VulkanImage>,
     canvas: Option<Canvas>,
     polygons: Polygons,
     description: Description,

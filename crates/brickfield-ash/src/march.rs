@@ -8,7 +8,7 @@ use brickfield_core::glam::{UVec2, UVec3};
 use brickfield_frame::{FrameUniforms, Pass, RenderError, Target};
 
 use crate::staging::Staging;
-use crate::vulkan::{BoundPipeline, Buffer, Device, Image, ImageBox, Queue, Use};
+use crate::vulkan::{BoundPipeline, Buffer, Device, ImageBox, Queue, Use, VulkanImage};
 
 /// Bytes of a pixel, and of a ray's emission and depth.
 pub(crate) const PIXEL_BYTES: usize = size_of::<[f32; 4]>();
@@ -21,14 +21,14 @@ pub(crate) struct RenderTime {
 
 /// The image to render to, of exactly this size.
 pub(crate) fn reserve_picture<'a>(
-    slot: &'a mut Option<Image>,
+    slot: &'a mut Option<VulkanImage>,
     device: &Arc<Device>,
     size: UVec2,
-) -> Result<&'a Image, RenderError> {
+) -> Result<&'a VulkanImage, RenderError> {
     slot.take_if(|i| i.extent() != size.extend(1));
     match slot {
         Some(image) => Ok(image),
-        none => Ok(none.insert(Image::picture(device, size)?)),
+        none => Ok(none.insert(VulkanImage::picture(device, size)?)),
     }
 }
 
@@ -36,7 +36,7 @@ pub(crate) fn reserve_picture<'a>(
 pub(crate) fn march(
     queue: &mut Queue,
     bound: &BoundPipeline<'_>,
-    picture: &Image,
+    picture: &VulkanImage,
     (buffer, uniforms): (&Buffer, FrameUniforms),
     passes: &[Pass],
 ) -> Result<RenderTime, RenderError> {
@@ -63,7 +63,7 @@ pub(crate) fn march(
 pub(crate) fn read_back(
     queue: &mut Queue,
     staging: &mut Staging,
-    picture: &Image,
+    picture: &VulkanImage,
     (target, mut before): (Target, Use),
 ) -> Result<Picture<f32>, RenderError> {
     let UVec3 { x: width, y: height, .. } = picture.extent();

@@ -12,7 +12,7 @@ use crate::march::milliseconds_since;
 use crate::resources::Reused;
 use crate::staging::Write;
 use crate::texture::check_format;
-use crate::vulkan::{Bindable, Image, ImageBox, Sampler, Use};
+use crate::vulkan::{Bindable, ImageBox, Sampler, Use, VulkanImage};
 
 impl Probe for AshBackend {
     fn texture_reads(&mut self, work: &TextureWork, n_runs: usize) -> Result<TextureReads, RenderError> {
@@ -50,12 +50,12 @@ impl Probe for AshBackend {
 
 impl AshBackend {
     /// The texture of a probe, layers by layers.
-    fn noise(&mut self, work: &TextureWork) -> Result<Image, RenderError> {
+    fn noise(&mut self, work: &TextureWork) -> Result<VulkanImage, RenderError> {
         check_format(&self.device, work.format, work.fetch == Fetch::Filtered)?;
         if work.texels.max_element() > self.device.physical().limits.max_image_dimension3_d {
             return Err(RenderError::Unsupported { what: "hold a 3-D texture with that many texels a side" });
         }
-        let image = Image::texture_3d(&self.device, work.format, work.texels)?;
+        let image = VulkanImage::texture_3d(&self.device, work.format, work.texels)?;
         self.queue.run("preparing a texture", |recorder| {
             recorder.image_barrier(&image, Use::Nothing, Use::CopyTarget);
         })?;

@@ -23,7 +23,7 @@ pub(crate) struct Write<'a> {
 }
 
 /// A part of a buffer's new content, and where it lies on the way.
-struct Piece<'a> {
+struct StagedWrite<'a> {
     target: &'a Buffer,
     target_offset: u64,
     staging_offset: usize,
@@ -65,7 +65,7 @@ impl Staging {
             }
             let from = staging.buffer();
             queue.run("uploading a frame's data", |recorder| {
-                for run in batch.chunk_by(Piece::is_followed_by) {
+                for run in batch.chunk_by(StagedWrite::is_followed_by) {
                     let n_bytes: usize = run.iter().map(|piece| piece.bytes.len()).sum();
                     let (from, to) = ((from, run[0].staging_offset as u64), (run[0].target, run[0].target_offset));
                     recorder.copy(from, to, n_bytes as u64);
@@ -102,9 +102,9 @@ fn reserve<'a>(
     }
 }
 
-impl Piece<'_> {
+impl StagedWrite<'_> {
     /// Whether another piece lies right behind this one, on both sides: one copy is enough for both.
-    fn is_followed_by(&self, other: &Piece<'_>) -> bool {
+    fn is_followed_by(&self, other: &StagedWrite<'_>) -> bool {
         let n_bytes = self.bytes.len();
         std::ptr::eq(self.target, other.target)
             && self.target_offset + n_bytes as u64 == other.target_offset
@@ -113,8 +113,8 @@ impl Piece<'_> {
 }
 
 /// Cuts contents into batches of at most `capacity` bytes.
-fn batches<'a>(writes: &[Write<'a>], capacity: usize) -> Vec<Vec<Piece<'a>>> {
-    let mut batches: Vec<Vec<Piece<'a>>> = Vec::new();
+fn batches<'a>(writes: &[Write<'a>], capacity: usize) -> Vec<Vec<StagedWrite<'a>>> {
+    let mut batches: Vec<Vec<StagedWrite<'a>>> = Vec::new();
     let mut used = capacity;
     for &Write { target, offset, bytes } in writes {
         for (i, bytes) in bytes.chunks(capacity).enumerate() {
@@ -123,7 +123,7 @@ fn batches<'a>(writes: &[Write<'a>], capacity: usize) -> Vec<Vec<Piece<'a>>> {
                 used = 0;
             }
             let target_offset = offset + (i * capacity) as u64;
-            let piece = Piece { target, target_offset, staging_offset: used, bytes };
+            let piece = StagedWrite { target, target_offset, staging_offset: used, bytes };
             used += bytes.len();
             match batches.last_mut() {
                 Some(batch) => batch.push(piece),

@@ -7,19 +7,19 @@ use brickfield_core::glam::UVec3;
 use brickfield_frame::{AtlasShape, Chunked, HeldChunks, Places, RenderError, SampleFormat, Slots};
 
 use crate::staging::Staging;
-use crate::vulkan::{Device, Image, ImageBox, Queue, Use, vulkan_format};
+use crate::vulkan::{Device, ImageBox, Queue, Use, VulkanImage, vulkan_format};
 
 /// A texture that holds slots.
 pub(crate) struct Texture {
-    image: Image,
-    shape: Shape,
+    image: VulkanImage,
+    shape: SlotShape,
     format: SampleFormat,
     held: HeldChunks,
 }
 
 /// How slots lie in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Shape {
+enum SlotShape {
     Atlas(AtlasShape),
     /// As the table of their places says.
     Table(UVec3),
@@ -45,11 +45,11 @@ impl Texture {
         let mut empty = |shape| Texture::empty(device, queue, shape, slots.format());
         match (slots.places(), old) {
             (_, Some(old)) if old.held.has_all(slots) => Ok(old),
-            (Places::Table { texels, .. }, Some(old)) if old.shape == Shape::Table(*texels) => Ok(old),
+            (Places::Table { texels, .. }, Some(old)) if old.shape == SlotShape::Table(*texels) => Ok(old),
             (Places::Table { texels, .. }, old) => {
                 drop(old);
                 match texels.max_element() <= limit {
-                    true => empty(Shape::Table(*texels)),
+                    true => empty(SlotShape::Table(*texels)),
                     false => Err(RenderError::TextureTooLarge { texels: *texels, limit }),
                 }
             }
@@ -64,12 +64,12 @@ impl Texture {
                     }
                     Some((shape, old)) if shape.n_bricks() < needed => match shape.grown(needed, limit) {
                         Some(grown) => old.grown(device, queue, grown),
-                        None => empty(Shape::Atlas(least)),
+                        None => empty(SlotShape::Atlas(least)),
                     },
                     old => {
                         // Both may not fit the device.
                         drop(old);
-                        empty(Shape::Atlas(least))
+                        empty(SlotShape::Atlas(least))
                     }
                 }
             }
@@ -79,13 +79,13 @@ impl Texture {
     /// How bricks lie in it.
     pub(crate) fn atlas_shape(&self) -> Option<AtlasShape> {
         match self.shape {
-            Shape::Atlas(shape) => Some(shape),
-            Shape::Table(_) => None,
+            SlotShape::Atlas(shape) => Some(shape),
+            SlotShape::Table(_) => None,
         }
     }
 
     /// The image that shaders read.
-    pub(crate) fn image(&self) -> &Image {
+    pub(crate) fn image(&self) -> &VulkanImage {
         &self.image
     }
 
@@ -93,10 +93,10 @@ impl Texture {
     fn empty(
         device: &Arc<Device>,
         queue: &mut Queue,
-        shape: Shape,
+        shape: SlotShape,
         format: SampleFormat,
     ) -> Result<Texture, RenderError> {
-        let image = Image::texture_3d(device, format, shape.texels())?;
+        let image = VulkanImage::texture_3d(device, format, shape.texels())?;
         queue.run("preparing the atlas", |recorder| {
             recorder.image_barrier(&image, Use::Nothing, Use::CopyTarget);
             recorder.clear(&image);
@@ -107,11 +107,11 @@ impl Texture {
 
     /// A larger atlas with this one's bricks at their places; without them if both do not fit the device.
     fn grown(self, device: &Arc<Device>, queue: &mut Queue, shape: AtlasShape) -> Result<Texture, RenderError> {
-        let larger = match Texture::empty(device, queue, Shape::Atlas(shape), self.format) {
+        let larger = match Texture::empty(device, queue, SlotShape::Atlas(shape), self.format) {
             Err(RenderError::OutOfMemory { .. }) => {
                 let format = self.format;
                 drop(self);
-                return Texture::empty(device, queue, Shape::Atlas(shape), format);
+                return Texture::empty(device, queue, SlotShape::Atlas(shape), format);
             }
             larger => larger?,
         };
@@ -171,18 +171,18 @@ impl Texture {
     fn place(&self, slots: &Slots, slot: u32, buffer_offset: u64) -> ImageBox {
         let (origin, extent) = match (self.shape, slots.places()) {
             (_, Places::Table { places, .. }) => (places[slot as usize].texel, places[slot as usize].n),
-            (Shape::Atlas(shape), Places::Even(side)) => (shape.origin(slot), UVec3::splat(side.n_samples())),
-            (Shape::Table(_), Places::Even(side)) => (UVec3::ZERO, UVec3::splat(side.n_samples())),
+            (SlotShape::Atlas(shape), Places::Even(side)) => (shape.origin(slot), UVec3::splat(side.n_samples())),
+            (SlotShape::Table(_), Places::Even(side)) => (UVec3::ZERO, UVec3::splat(side.n_samples())),
         };
         ImageBox { buffer_offset, origin, extent }
     }
 }
 
-impl Shape {
+impl SlotShape {
     fn texels(self) -> UVec3 {
         match self {
-            Shape::Atlas(shape) => shape.texels(),
-            Shape::Table(texels) => texels,
+            SlotShape::Atlas(shape) => shape.texels(),
+            SlotShape::Table(texels) => texels,
         }
     }
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::bins::{BinTable, Histogram};
 use crate::downsample::{Dense, downsample};
 use crate::fill::{copy_brick, owned_histogram, range_of};
-use crate::sample::Sample;
+use crate::sample::BrickScalar;
 use crate::tree::{TreeId, TreeLevel};
 use crate::{Bins, BrickSummary, BrickTree, Downsampling, tree_memory};
 
@@ -101,7 +101,7 @@ fn check_size(layout: &BrickLayout, volume: &Volume, options: &BuildOptions) -> 
     Ok(n_bricks as usize)
 }
 
-fn build_levels<T: Sample>(voxels: &[T], job: &Job<'_>) -> Result<Vec<TreeLevel>, BuildError> {
+fn build_levels<T: BrickScalar>(voxels: &[T], job: &Job<'_>) -> Result<Vec<TreeLevel>, BuildError> {
     let finest = Dense { samples: voxels, dims: job.layout.dims() };
     let mut levels = vec![finest_level(finest, job)?];
     let mut below: Vec<T> = Vec::new();
@@ -120,7 +120,7 @@ fn build_levels<T: Sample>(voxels: &[T], job: &Job<'_>) -> Result<Vec<TreeLevel>
     Ok(levels)
 }
 
-fn finest_level<T: Sample>(source: Dense<'_, T>, job: &Job<'_>) -> Result<TreeLevel, BuildError> {
+fn finest_level<T: BrickScalar>(source: Dense<'_, T>, job: &Job<'_>) -> Result<TreeLevel, BuildError> {
     let table = BinTable::new(job.bins, T::TYPE);
     fill_level(source, Level(0), job, |id, samples| BrickSummary {
         range: range_of(samples),
@@ -128,7 +128,7 @@ fn finest_level<T: Sample>(source: Dense<'_, T>, job: &Job<'_>) -> Result<TreeLe
     })
 }
 
-fn coarse_level<T: Sample>(
+fn coarse_level<T: BrickScalar>(
     source: Dense<'_, T>,
     level: Level,
     below: &[BrickSummary],
@@ -144,7 +144,7 @@ fn coarse_level<T: Sample>(
     })
 }
 
-fn fill_level<T: Sample>(
+fn fill_level<T: BrickScalar>(
     source: Dense<'_, T>,
     level: Level,
     job: &Job<'_>,
@@ -165,7 +165,7 @@ fn fill_level<T: Sample>(
 }
 
 /// Zeros that the system hands out page by page, so that the threads that fill them also fault them in.
-fn zeroed<T: Sample>(n: usize, level: Level) -> Result<Vec<T>, BuildError> {
+fn zeroed<T: BrickScalar>(n: usize, level: Level) -> Result<Vec<T>, BuildError> {
     // Asking first, without touching the memory, turns an abort into an error.
     let asked = Vec::<T>::new().try_reserve_exact(n);
     asked.map_err(|_| BuildError::OutOfMemory { level, needed_bytes: n as u64 * T::TYPE.n_bytes() as u64 })?;

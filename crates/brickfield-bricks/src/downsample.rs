@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use brickfield_core::glam;
 
-use crate::sample::Sample;
+use crate::sample::BrickScalar;
 
 /// How a level is computed from the finer one, A, below it. B_i lies where A_2i lies (pixel-centre alignment).
 ///
@@ -42,7 +42,7 @@ impl<'a, T> Dense<'a, T> {
 }
 
 /// The samples, x fastest, of the level of `dims` samples that lies above `below`.
-pub(crate) fn downsample<T: Sample>(below: Dense<'_, T>, dims: UVec3, how: Downsampling) -> Vec<T> {
+pub(crate) fn downsample<T: BrickScalar>(below: Dense<'_, T>, dims: UVec3, how: Downsampling) -> Vec<T> {
     let n_plane = dims.x as usize * dims.y as usize;
     let mut above = vec![T::default(); n_plane * dims.z as usize];
     above.par_chunks_mut(n_plane).enumerate().for_each(|(z, plane)| match how {
@@ -52,7 +52,7 @@ pub(crate) fn downsample<T: Sample>(below: Dense<'_, T>, dims: UVec3, how: Downs
     above
 }
 
-fn subsample_plane<T: Sample>(below: Dense<'_, T>, z: usize, nx: usize, plane: &mut [T]) {
+fn subsample_plane<T: BrickScalar>(below: Dense<'_, T>, z: usize, nx: usize, plane: &mut [T]) {
     for (y, row) in plane.chunks_exact_mut(nx).enumerate() {
         let source = below.row(2 * y, 2 * z);
         for (b, a) in row.iter_mut().zip(source.iter().step_by(2)) {
@@ -64,7 +64,7 @@ fn subsample_plane<T: Sample>(below: Dense<'_, T>, z: usize, nx: usize, plane: &
     }
 }
 
-fn average_plane<T: Sample>(below: Dense<'_, T>, z: usize, nx: usize, plane: &mut [T]) {
+fn average_plane<T: BrickScalar>(below: Dense<'_, T>, z: usize, nx: usize, plane: &mut [T]) {
     let mut sums = vec![T::Sum::default(); below.dims.x as usize];
     for (y, row) in plane.chunks_exact_mut(nx).enumerate() {
         let at = |i: usize| below.row(clamped_tap(y, i % 3, below.dims.y), clamped_tap(z, i / 3, below.dims.z));
@@ -86,7 +86,7 @@ fn tent<S: Copy + std::ops::Add<Output = S>>(a: S, b: S, c: S) -> S {
 }
 
 /// The tent across y (fastest) and z of nine rows: 16 times the mean.
-fn sum_rows<T: Sample>(rows: [&[T]; 9], sums: &mut [T::Sum]) {
+fn sum_rows<T: BrickScalar>(rows: [&[T]; 9], sums: &mut [T::Sum]) {
     let n = sums.len();
     let rows = rows.map(|r| &r[..n]);
     for (x, sum) in sums.iter_mut().enumerate() {
@@ -96,7 +96,7 @@ fn sum_rows<T: Sample>(rows: [&[T]; 9], sums: &mut [T::Sum]) {
 }
 
 /// The tent along x.
-fn average_row<T: Sample>(sums: &[T::Sum], row: &mut [T]) {
+fn average_row<T: BrickScalar>(sums: &[T::Sum], row: &mut [T]) {
     let last = row.len() - 1;
     let at = |i: usize| {
         let tap = |tap| sums[clamped_tap(i, tap, sums.len() as u32)];

@@ -5,11 +5,11 @@ use brickfield_core::{BrickId, BrickLayout, ValueRange};
 
 use crate::bins::{BinTable, Histogram};
 use crate::downsample::Dense;
-use crate::sample::Sample;
+use crate::sample::BrickScalar;
 use crate::tally::Tally;
 
 /// Copies the brick's samples; samples beyond the level's border replicate the border sample.
-pub(crate) fn copy_brick<T: Sample>(source: Dense<'_, T>, layout: &BrickLayout, id: BrickId, out: &mut [T]) {
+pub(crate) fn copy_brick<T: BrickScalar>(source: Dense<'_, T>, layout: &BrickLayout, id: BrickId, out: &mut [T]) {
     let n = layout.side().n_samples() as usize;
     let [x, y, z] = first_sample(layout, id).to_array().map(|i| i as usize);
     let n_inside = n.min(source.dims.x as usize - x);
@@ -22,7 +22,7 @@ pub(crate) fn copy_brick<T: Sample>(source: Dense<'_, T>, layout: &BrickLayout, 
 }
 
 /// Least and greatest of all samples of a brick.
-pub(crate) fn range_of<T: Sample>(samples: &[T]) -> ValueRange {
+pub(crate) fn range_of<T: BrickScalar>(samples: &[T]) -> ValueRange {
     const LANES: usize = 16;
     let (mut min, mut max) = ([samples[0]; LANES], [samples[0]; LANES]);
     for group in samples.as_chunks::<LANES>().0 {
@@ -37,7 +37,7 @@ pub(crate) fn range_of<T: Sample>(samples: &[T]) -> ValueRange {
 }
 
 /// The histogram of the voxels that a level-0 brick owns: not its upper faces, except at the volume's border.
-pub(crate) fn owned_histogram<T: Sample>(
+pub(crate) fn owned_histogram<T: BrickScalar>(
     samples: &[T],
     layout: &BrickLayout,
     id: BrickId,

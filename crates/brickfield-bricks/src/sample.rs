@@ -7,7 +7,7 @@ use brickfield_core::Scalar;
 use crate::bins::BinTable;
 
 /// A scalar that bricks can be built of.
-pub(crate) trait Sample: Scalar {
+pub(crate) trait BrickScalar: Scalar {
     /// Holds 64 times any value.
     type Sum: Copy + Default + Add<Output = Self::Sum> + Send;
     fn widen(self) -> Self::Sum;
@@ -86,13 +86,13 @@ impl BrickSamples<'_> {
     /// If `out` is not [`n_bytes`](Self::n_bytes) long.
     pub fn copy_le_bytes(&self, out: &mut [u8]) {
         assert_eq!(out.len(), self.n_bytes(), "bytes to write a brick to");
-        with_brick_samples!(self, s => Sample::copy_le_bytes(s, out));
+        with_brick_samples!(self, s => BrickScalar::copy_le_bytes(s, out));
     }
 }
 
 macro_rules! sample {
     ($($t:ident $v:ident $sum:ident $widen:expr, $narrow:expr, $bin:expr;)*) => { $(
-        impl Sample for $t {
+        impl BrickScalar for $t {
             type Sum = $sum;
             #[inline]
             fn widen(self) -> $sum { $widen(self) }

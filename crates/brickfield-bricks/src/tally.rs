@@ -1,7 +1,7 @@
 //! Counting the values of a brick, fast.
 
 use crate::bins::{BinTable, Histogram, N_BINS};
-use crate::sample::Sample;
+use crate::sample::BrickScalar;
 
 const LANES: usize = 4;
 
@@ -11,7 +11,7 @@ pub(crate) struct Tally([[u32; N_BINS]; LANES]);
 
 impl Tally {
     #[inline]
-    pub(crate) fn count<T: Sample>(&mut self, row: &[T], table: &BinTable) {
+    pub(crate) fn count<T: BrickScalar>(&mut self, row: &[T], table: &BinTable) {
         let (groups, rest) = row.as_chunks::<LANES>();
         for group in groups {
             for (lane, v) in self.0.iter_mut().zip(group) {

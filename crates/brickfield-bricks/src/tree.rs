@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use brickfield_core::{BrickId, BrickLayout, Grid, Level, ScalarType, ValueRange, Voxels, with_voxels};
 
-use crate::sample::Sample;
+use crate::sample::BrickScalar;
 use crate::{Bins, BrickSamples, Downsampling, Histogram, TreeMemory, tree_memory};
 
 /// A volume as an octree of bricks (LaMar, Hamann and Joy 1999, section 3).
@@ -102,7 +102,7 @@ impl BrickTree {
     pub fn samples(&self, id: BrickId) -> BrickSamples<'_> {
         let n = self.layout.side().n_samples_total();
         let start = n * self.ordinal(id);
-        with_voxels!(&self.level(id.level).samples, v => Sample::borrow(&v[start..start + n]))
+        with_voxels!(&self.level(id.level).samples, v => BrickScalar::borrow(&v[start..start + n]))
     }
 
     /// The samples of all bricks of a level, brick after brick in the order of [`BrickLayout::bricks`].

@@ -5,9 +5,9 @@ use brickfield_core::Voxels;
 use crate::error::counted;
 use crate::file_list::FileNames;
 use crate::files::{DataFiles, open_named};
-use crate::limits::Shape;
+use crate::limits::CheckedShape;
 use crate::samples::allocate;
-use crate::stored::{Part, Stored};
+use crate::stored::{DataFile, StoredSamples};
 use crate::{Note, ReadError};
 
 /// Reads the shape's voxels: the first ones of `n_promised` samples that are spread evenly over the files.
@@ -16,8 +16,8 @@ use crate::{Note, ReadError};
 pub(crate) fn read_detached(
     names: &FileNames,
     n_promised: u128,
-    shape: &Shape,
-    stored: &Stored,
+    shape: &CheckedShape,
+    stored: &StoredSamples,
     files: &dyn DataFiles,
     notes: &mut Vec<Note>,
 ) -> Result<Voxels, ReadError> {
@@ -31,12 +31,12 @@ pub(crate) fn read_detached(
     };
     let sample_bytes = shape.scalar.n_bytes();
     for (name, n_wanted) in parts() {
-        let part = Part { name: &name, n_samples: n_per_file, n_wanted };
+        let part = DataFile { name: &name, n_samples: n_per_file, n_wanted };
         stored.seek_samples(&mut *open_named(files, &name)?, &part, sample_bytes)?;
     }
     let mut voxels = allocate(shape)?;
     for (name, n_wanted) in parts() {
-        let part = Part { name: &name, n_samples: n_per_file, n_wanted };
+        let part = DataFile { name: &name, n_samples: n_per_file, n_wanted };
         let mut source = open_named(files, &name)?;
         stored.seek_samples(&mut *source, &part, sample_bytes)?;
         stored.append(&mut voxels, &mut *source, &part, notes)?;

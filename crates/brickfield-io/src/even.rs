@@ -3,7 +3,7 @@
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Grid, Scalar, Volume, Voxels, with_voxels};
 
-use crate::limits::Shape;
+use crate::limits::CheckedShape;
 use crate::samples::with_room;
 use crate::{Limits, Note, Opened};
 
@@ -39,7 +39,7 @@ fn resampled(volume: &Volume, positions: &[f64], limits: &Limits) -> Option<(Vol
         return None;
     }
     let n_even = n_steps as u64 + 1;
-    let shape = Shape::claim([dims.x.into(), dims.y.into(), n_even], volume.scalar_type(), limits).ok()?;
+    let shape = CheckedShape::claim([dims.x.into(), dims.y.into(), n_even], volume.scalar_type(), limits).ok()?;
     let step = extent / n_steps;
     let voxels = with_voxels!(volume.voxels(), v => even(v, &shape, positions, step))?;
     let grid = even_grid(volume.grid(), shape.dims, step)?;
@@ -65,7 +65,7 @@ fn even_grid(grid: &Grid, dims: UVec3, step: f64) -> Option<Grid> {
 }
 
 /// Slices at multiples of `step`, mixed from those at `positions`; `None` if there is no memory for them.
-fn even<T: Scalar>(voxels: &[T], shape: &Shape, positions: &[f64], step: f64) -> Option<Voxels> {
+fn even<T: Scalar>(voxels: &[T], shape: &CheckedShape, positions: &[f64], step: f64) -> Option<Voxels> {
     let mut out = with_room(shape.n_voxels()).ok()?;
     let n_slice = voxels.len() / positions.len();
     let slice = |i: usize| &voxels[i * n_slice..][..n_slice];

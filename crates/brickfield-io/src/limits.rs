@@ -24,21 +24,21 @@ impl Default for Limits {
 
 /// A shape that has been held against the limits: the only way to an allocation.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Shape {
+pub(crate) struct CheckedShape {
     pub(crate) dims: UVec3,
     pub(crate) scalar: ScalarType,
 }
 
-impl Shape {
+impl CheckedShape {
     /// # Errors
     /// A dimension outside 1..=u32::MAX, or more bytes than the limit.
-    pub(crate) fn claim(dims: [u64; 3], scalar: ScalarType, limits: &Limits) -> Result<Shape, ReadError> {
+    pub(crate) fn claim(dims: [u64; 3], scalar: ScalarType, limits: &Limits) -> Result<CheckedShape, ReadError> {
         let mut checked = [0u32; 3];
         for ((out, value), axis) in checked.iter_mut().zip(dims).zip(['x', 'y', 'z']) {
             let in_range = u32::try_from(value).ok().filter(|v| *v >= 1);
             *out = in_range.ok_or_else(|| ReadError::field(format!("dimension {axis}"), value, "1 to 4294967295"))?;
         }
-        let shape = Shape { dims: UVec3::from(checked), scalar };
+        let shape = CheckedShape { dims: UVec3::from(checked), scalar };
         let what = || format!("a volume of {} x {} x {} voxels of {scalar}", dims[0], dims[1], dims[2]);
         check_bytes(shape.n_voxels_claimed() * scalar.n_bytes() as u128, limits, what)?;
         Ok(shape)

@@ -13,12 +13,12 @@ use crate::detached::read_detached;
 use crate::error::{Shown, counted};
 use crate::file_list::FileNames;
 use crate::files::ByteSource;
-use crate::limits::Shape;
+use crate::limits::CheckedShape;
 use crate::lines::{HeaderLines, numbers};
-use crate::opened::Found;
-use crate::placement::{AXES, Placement, usable_spacing};
+use crate::opened::FileFacts;
+use crate::placement::{AXES, GridPlacement, usable_spacing};
 use crate::samples::allocate;
-use crate::stored::{ByteSkip, Encoding, Part, Stored};
+use crate::stored::{ByteSkip, DataFile, Encoding, StoredSamples};
 use crate::{ByteOrder, DataFiles, Format, Limits, Note, Opened, ReadError, WorldFrame};
 
 /// Reads a MetaImage from its header on; `files` finds detached data.
@@ -33,11 +33,11 @@ pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, limits: &Limi
 }
 
 fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, limits: &Limits) -> Result<Opened, ReadError> {
-    let header = Header::read(source)?;
+    let header = MetaHeader::read(source)?;
     let scalar = header.scalar()?;
     let stored = header.stored()?;
-    let mut found = Found::plain(Format::MetaImage);
-    let shape = Shape::claim(header.volume_dims(&mut found.notes), scalar, limits)?;
+    let mut found = FileFacts::plain(Format::MetaImage);
+    let shape = CheckedShape::claim(header.volume_dims(&mut found.notes), scalar, limits)?;
     let grid = header.placement(&mut found.notes)?.grid(shape.dims)?;
     let voxels = match &header.data {
         Some(names) => read_detached(names, header.n_samples(), &shape, &stored, files, &mut found.notes)?,
@@ -49,19 +49,20 @@ fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, limits: &Limits
 
 fn read_local(
     source: &mut dyn ByteSource,
-    header: &Header,
-    shape: &Shape,
-    stored: &Stored,
+    header: &MetaHeader,
+    shape: &CheckedShape,
+    stored: &StoredSamples,
     notes: &mut Vec<Note>,
 ) -> Result<Voxels, ReadError> {
-    let part = Part { name: "the data after the header", n_samples: header.n_samples(), n_wanted: shape.n_voxels() };
+    let part =
+        DataFile { name: "the data after the header", n_samples: header.n_samples(), n_wanted: shape.n_voxels() };
     stored.seek_samples(source, &part, shape.scalar.n_bytes())?;
     let mut voxels = allocate(shape)?;
     stored.append(&mut voxels, source, &part, notes)?;
     Ok(voxels)
 }
 
-struct Header {
+struct MetaHeader {
     fields: BTreeMap<String, String>,
     sizes: Vec<u64>,
     /// Nothing if the data follow the header.
@@ -82,9 +83,9 @@ pub(crate) fn has_magic(head: &[u8]) -> bool {
     FIRST_KEYS.contains(&key.as_str())
 }
 
-impl Header {
+impl MetaHeader {
     /// Reads up to ElementDataFile; the source is then at the first byte of local data.
-    fn read(source: &mut dyn ByteSource) -> Result<Header, ReadError> {
+    fn read(source: &mut dyn ByteSource) -> Result<MetaHeader, ReadError> {
         let mut lines = HeaderLines::new(source);
         let mut fields = BTreeMap::new();
         let mut is_first = true;
@@ -97,7 +98,7 @@ impl Header {
             if key == "elementdatafile" {
                 let sizes = read_sizes(&fields)?;
                 let data = file_names(&value, &sizes, &mut lines)?;
-                return Ok(Header { fields, sizes, data });
+                return Ok(MetaHeader { fields, sizes, data });
             }
             fields.insert(key, value);
         }
@@ -134,7 +135,7 @@ impl Header {
         })
     }
 
-    fn stored(&self) -> Result<Stored, ReadError> {
+    fn stored(&self) -> Result<StoredSamples, ReadError> {
         let order = match self.is_true(&["binarydatabyteordermsb", "elementbyteordermsb"]) {
             true => ByteOrder::Big,
             false => ByteOrder::Little,
@@ -147,7 +148,7 @@ impl Header {
                 .map(ByteSkip::Bytes)
                 .map_err(|_| ReadError::field("HeaderSize", text, "an integer of at least -1"))?,
         };
-        Ok(Stored { encoding: self.encoding()?, order, line_skip: 0, byte_skip })
+        Ok(StoredSamples { encoding: self.encoding()?, order, line_skip: 0, byte_skip })
     }
 
     fn encoding(&self) -> Result<Encoding, ReadError> {
@@ -171,7 +172,7 @@ impl Header {
         [0, 1, 2].map(|axis| self.sizes.get(axis).copied().unwrap_or(1))
     }
 
-    fn placement(&self, notes: &mut Vec<Note>) -> Result<Placement, ReadError> {
+    fn placement(&self, notes: &mut Vec<Note>) -> Result<GridPlacement, ReadError> {
         let n_axes = self.sizes.len();
         let spacing = self.numbers(&["elementspacing", "elementsize"], "ElementSpacing", n_axes)?;
         let offset = self.numbers(&["offset", "origin", "position"], "Offset", n_axes)?.unwrap_or_default();
@@ -183,7 +184,7 @@ impl Header {
             direction * length
         });
         let steps: Vec<DVec3> = steps.collect();
-        Ok(Placement::from_axes(&steps, vector(&offset)))
+        Ok(GridPlacement::from_axes(&steps, vector(&offset)))
     }
 
     fn numbers(&self, keys: &[&str], field: &'static str, n: usize) -> Result<Option<Vec<f64>>, ReadError> {

@@ -13,9 +13,9 @@ use crate::deflate::{check_ratio, inflate};
 use crate::error::Shown;
 use crate::error::check_length;
 use crate::files::{ByteSource, n_bytes_left, open_named};
-use crate::limits::{Shape, check_bytes};
-use crate::opened::Found;
-use crate::placement::{AXES, Placement, usable_spacing};
+use crate::limits::{CheckedShape, check_bytes};
+use crate::opened::FileFacts;
+use crate::placement::{AXES, GridPlacement, usable_spacing};
 use crate::rescale::{Rescale, rescaled, rescaled_type};
 use crate::samples::{allocate, append_binary, fill_named, skip};
 use crate::{ByteOrder, DataFiles, Format, Limits, Note, Opened, ReadError, WorldFrame};
@@ -131,13 +131,13 @@ struct Position {
 }
 
 fn read_image(header: &NiftiHeader, mut stream: Stream, at: Position, limits: &Limits) -> Result<Opened, ReadError> {
-    let mut found = Found::plain(Format::Nifti);
+    let mut found = FileFacts::plain(Format::Nifti);
     let (dims, n_all) = dims(header, &mut found.notes)?;
     let stored = scalar(header)?;
     let rescale = rescale(header, &mut found.notes);
-    let shape = Shape::claim(dims, stored, limits)?;
+    let shape = CheckedShape::claim(dims, stored, limits)?;
     if rescale != Rescale::IDENTITY {
-        Shape::claim(dims, rescaled_type(stored), limits)?;
+        CheckedShape::claim(dims, rescaled_type(stored), limits)?;
     }
     let (placement, frame) = placement(header, &mut found.notes);
     let grid = placement.grid(shape.dims)?;
@@ -219,7 +219,7 @@ fn rescale(header: &NiftiHeader, notes: &mut Vec<Note>) -> Rescale {
     }
 }
 
-fn placement(header: &NiftiHeader, notes: &mut Vec<Note>) -> (Placement, WorldFrame) {
+fn placement(header: &NiftiHeader, notes: &mut Vec<Note>) -> (GridPlacement, WorldFrame) {
     if header.sform_code > 0 {
         match by_sform(header) {
             Some(placement) => return (placement.negated_xy(), WorldFrame::Lps),
@@ -233,11 +233,11 @@ fn placement(header: &NiftiHeader, notes: &mut Vec<Note>) -> (Placement, WorldFr
             None => notes.push(Note::OrientationIgnored { what: "the qform is not finite" }),
         }
     }
-    (Placement::axis_aligned(spacing, DVec3::ZERO), WorldFrame::Plain)
+    (GridPlacement::axis_aligned(spacing, DVec3::ZERO), WorldFrame::Plain)
 }
 
 /// nifti1.h, method 3: rows of the affine map from index to world.
-fn by_sform(header: &NiftiHeader) -> Option<Placement> {
+fn by_sform(header: &NiftiHeader) -> Option<GridPlacement> {
     let rows = [header.srow_x, header.srow_y, header.srow_z].map(|row| row.map(f64::from));
     let column = |i: usize| DVec3::new(rows[0][i], rows[1][i], rows[2][i]);
     let steps = DMat3::from_cols(column(0), column(1), column(2));
@@ -245,11 +245,11 @@ fn by_sform(header: &NiftiHeader) -> Option<Placement> {
     let unit =
         DMat3::from_cols_array_2d(&steps.to_cols_array_2d().map(|c| DVec3::from(c).normalize_or_zero().to_array()));
     let usable = unit.determinant().abs() > 1e-6 && first_sample.is_finite();
-    usable.then_some(Placement { first_sample, steps })
+    usable.then_some(GridPlacement { first_sample, steps })
 }
 
 /// nifti1.h, method 2: a rotation by the quaternion (a, b, c, d), z mirrored if pixdim[0] is -1.
-fn by_qform(header: &NiftiHeader, spacing: DVec3) -> Option<Placement> {
+fn by_qform(header: &NiftiHeader, spacing: DVec3) -> Option<GridPlacement> {
     let [b, c, d] = [header.quatern_b, header.quatern_c, header.quatern_d].map(f64::from);
     let a = (1.0 - (b * b + c * c + d * d)).max(0.0).sqrt();
     let first_sample = DVec3::from([header.quatern_x, header.quatern_y, header.quatern_z].map(f64::from));
@@ -259,7 +259,7 @@ fn by_qform(header: &NiftiHeader, spacing: DVec3) -> Option<Placement> {
     let mirror = if header.pixdim[0] < 0.0 { -1.0 } else { 1.0 };
     let rotation = DMat3::from_quat(DQuat::from_xyzw(b, c, d, a).normalize());
     let steps = rotation * DMat3::from_diagonal(spacing * DVec3::new(1.0, 1.0, mirror));
-    Some(Placement { first_sample, steps })
+    Some(GridPlacement { first_sample, steps })
 }
 
 fn unit(header: &NiftiHeader) -> Option<String> {

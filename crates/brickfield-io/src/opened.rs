@@ -34,21 +34,21 @@ pub enum WorldFrame {
 }
 
 /// The parts of [`Opened`] before the volume is made.
-pub(crate) struct Found {
+pub(crate) struct FileFacts {
     pub(crate) format: Format,
     pub(crate) frame: WorldFrame,
     pub(crate) unit: Option<String>,
     pub(crate) notes: Vec<Note>,
 }
 
-impl Found {
-    pub(crate) fn plain(format: Format) -> Found {
-        Found { format, frame: WorldFrame::Plain, unit: None, notes: Vec::new() }
+impl FileFacts {
+    pub(crate) fn plain(format: Format) -> FileFacts {
+        FileFacts { format, frame: WorldFrame::Plain, unit: None, notes: Vec::new() }
     }
 
     #[cfg(any(feature = "ome-zarr", feature = "tiff"))]
-    pub(crate) fn pictures(format: Format) -> Found {
-        Found { frame: WorldFrame::Pictures, ..Found::plain(format) }
+    pub(crate) fn pictures(format: Format) -> FileFacts {
+        FileFacts { frame: WorldFrame::Pictures, ..FileFacts::plain(format) }
     }
 
     pub(crate) fn finish(mut self, grid: Grid, voxels: Voxels) -> Result<Opened, ReadError> {

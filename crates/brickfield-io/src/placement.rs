@@ -7,35 +7,35 @@ use crate::{Note, ReadError};
 
 /// The world position of the first sample, and one world step per index axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Placement {
+pub(crate) struct GridPlacement {
     pub(crate) first_sample: DVec3,
     pub(crate) steps: DMat3,
 }
 
-impl Placement {
-    pub(crate) fn axis_aligned(spacing: DVec3, first_sample: DVec3) -> Placement {
-        Placement { first_sample, steps: DMat3::from_diagonal(spacing) }
+impl GridPlacement {
+    pub(crate) fn axis_aligned(spacing: DVec3, first_sample: DVec3) -> GridPlacement {
+        GridPlacement { first_sample, steps: DMat3::from_diagonal(spacing) }
     }
 
     /// Up to three axis steps; missing ones are made up, of length 1 and orthogonal to those given.
-    pub(crate) fn from_axes(axes: &[DVec3], first_sample: DVec3) -> Placement {
+    pub(crate) fn from_axes(axes: &[DVec3], first_sample: DVec3) -> GridPlacement {
         let steps = match *axes {
             [] => DMat3::IDENTITY,
             [x] => with_orthogonal(x),
             [x, y] => DMat3::from_cols(x, y, x.cross(y).normalize_or(DVec3::Z)),
             [x, y, z, ..] => DMat3::from_cols(x, y, z),
         };
-        Placement { first_sample, steps }
+        GridPlacement { first_sample, steps }
     }
 
     #[cfg(feature = "nifti")]
     /// The same place with +x and +y negated: right-anterior-superior to left-posterior-superior and back.
-    pub(crate) fn negated_xy(self) -> Placement {
+    pub(crate) fn negated_xy(self) -> GridPlacement {
         self.scaled(DVec3::new(-1.0, -1.0, 1.0))
     }
 
-    pub(crate) fn scaled(self, factors: DVec3) -> Placement {
-        Placement { first_sample: self.first_sample * factors, steps: DMat3::from_diagonal(factors) * self.steps }
+    pub(crate) fn scaled(self, factors: DVec3) -> GridPlacement {
+        GridPlacement { first_sample: self.first_sample * factors, steps: DMat3::from_diagonal(factors) * self.steps }
     }
 
     /// # Errors

@@ -6,12 +6,12 @@ use std::path::Path;
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{ScalarType, Volume};
 
-use crate::limits::Shape;
-use crate::opened::Found;
-use crate::placement::Placement;
+use crate::limits::CheckedShape;
+use crate::opened::FileFacts;
+use crate::placement::GridPlacement;
 use crate::samples::allocate;
 use crate::save::{SaveError, save_atomically, write_samples};
-use crate::stored::{ByteSkip, Encoding, Part, Stored};
+use crate::stored::{ByteSkip, DataFile, Encoding, StoredSamples};
 use crate::{ByteOrder, Format, Limits, Opened, ReadError};
 
 /// What has to be known about a raw file.
@@ -41,13 +41,13 @@ impl RawSpec {
 /// # Errors
 /// What [`ReadError`] lists: a shape beyond the limits or the file, a spacing that is not above 0.
 pub fn read(mut input: impl BufRead + Seek, spec: &RawSpec, limits: &Limits) -> Result<Opened, ReadError> {
-    let shape = Shape::claim(spec.dims.to_array().map(u64::from), spec.scalar, limits)?;
-    let grid = Placement::axis_aligned(spec.spacing, 0.5 * spec.spacing).grid(shape.dims)?;
+    let shape = CheckedShape::claim(spec.dims.to_array().map(u64::from), spec.scalar, limits)?;
+    let grid = GridPlacement::axis_aligned(spec.spacing, 0.5 * spec.spacing).grid(shape.dims)?;
     let byte_skip = ByteSkip::Bytes(spec.skip_bytes);
-    let stored = Stored { encoding: Encoding::Raw, order: spec.order, line_skip: 0, byte_skip };
-    let part = Part { name: "the file", n_samples: shape.n_voxels() as u128, n_wanted: shape.n_voxels() };
+    let stored = StoredSamples { encoding: Encoding::Raw, order: spec.order, line_skip: 0, byte_skip };
+    let part = DataFile { name: "the file", n_samples: shape.n_voxels() as u128, n_wanted: shape.n_voxels() };
     stored.seek_samples(&mut input, &part, spec.scalar.n_bytes())?;
-    let mut found = Found::plain(Format::Raw);
+    let mut found = FileFacts::plain(Format::Raw);
     let mut voxels = allocate(&shape)?;
     stored.append(&mut voxels, &mut input, &part, &mut found.notes)?;
     found.finish(grid, voxels)

@@ -8,7 +8,7 @@ use brickfield_core::{Scalar, ScalarType, Voxels, with_voxels};
 use crate::ReadError;
 #[cfg(feature = "gzip")]
 use crate::error::check_length;
-use crate::limits::Shape;
+use crate::limits::CheckedShape;
 
 /// Which end of a number comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -19,13 +19,13 @@ pub enum ByteOrder {
 }
 
 /// A scalar that can be read from bytes and from text.
-pub(crate) trait Sample: Scalar + FromStr {
+pub(crate) trait FileScalar: Scalar + FromStr {
     fn append(bytes: &[u8], order: ByteOrder, out: &mut Vec<Self>);
 }
 
 macro_rules! sample {
     ($($t:ty)*) => { $(
-        impl Sample for $t {
+        impl FileScalar for $t {
             fn append(bytes: &[u8], order: ByteOrder, out: &mut Vec<$t>) {
                 let (numbers, _) = bytes.as_chunks::<{ size_of::<$t>() }>();
                 match order {
@@ -53,7 +53,7 @@ pub(crate) fn with_room<T>(n: usize) -> Result<Vec<T>, ReadError> {
 ///
 /// # Errors
 /// If there is no memory for them.
-pub(crate) fn allocate(shape: &Shape) -> Result<Voxels, ReadError> {
+pub(crate) fn allocate(shape: &CheckedShape) -> Result<Voxels, ReadError> {
     fn reserve<T: Scalar>(n: usize) -> Result<Voxels, ReadError> {
         with_room(n).map(T::wrap)
     }
@@ -83,7 +83,7 @@ pub(crate) fn append_binary(
 
 const CHUNK_BYTES: usize = 1 << 18;
 
-fn append_binary_as<T: Sample>(
+fn append_binary_as<T: FileScalar>(
     out: &mut Vec<T>,
     reader: &mut dyn Read,
     n: usize,
@@ -164,7 +164,7 @@ pub(crate) fn append_text(
     with_voxels!(voxels, v => append_text_as(v, reader, n, what))
 }
 
-fn append_text_as<T: Sample>(
+fn append_text_as<T: FileScalar>(
     out: &mut Vec<T>,
     reader: &mut dyn BufRead,
     n: usize,
@@ -185,7 +185,7 @@ fn append_text_as<T: Sample>(
 }
 
 /// The number, also where an integer is written as a float ("3.0").
-fn parse<T: Sample>(text: &str) -> Option<T> {
+fn parse<T: FileScalar>(text: &str) -> Option<T> {
     text.parse().ok().or_else(|| {
         let wide: f64 = text.parse().ok()?;
         let value = T::from_f64(wide);

@@ -30,7 +30,7 @@ pub(crate) enum ByteSkip {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stored {
+pub(crate) struct StoredSamples {
     pub(crate) encoding: Encoding,
     pub(crate) order: ByteOrder,
     pub(crate) line_skip: u64,
@@ -39,18 +39,18 @@ pub(crate) struct Stored {
 
 /// One data file: how many samples it holds, and how many of them (the first ones) are wanted.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Part<'a> {
+pub(crate) struct DataFile<'a> {
     pub(crate) name: &'a str,
     pub(crate) n_samples: u128,
     pub(crate) n_wanted: usize,
 }
 
-impl Stored {
+impl StoredSamples {
     /// Skips to the samples and checks, before anything is allocated, that the rest of the source can hold them.
     pub(crate) fn seek_samples(
         &self,
         source: &mut dyn ByteSource,
-        part: &Part,
+        part: &DataFile,
         sample_bytes: usize,
     ) -> Result<(), ReadError> {
         for _ in 0..self.line_skip {
@@ -114,7 +114,7 @@ impl Stored {
         &self,
         voxels: &mut Voxels,
         source: &mut dyn ByteSource,
-        part: &Part,
+        part: &DataFile,
         notes: &mut Vec<Note>,
     ) -> Result<(), ReadError> {
         match self.encoding {

@@ -26,7 +26,7 @@ fn full_resolution(bencher: Bencher<'_, '_>, eye: Eye) {
 
 #[divan::bench]
 fn full_resolution_without_culling(bencher: Bencher<'_, '_>) {
-    let scene = Scene::new(Eye::Outside, Culling::Off);
+    let scene = SelectionInput::new(Eye::Outside, Culling::Off);
     bencher.bench(|| scene.select(&[Criterion::FullResolution]));
 }
 
@@ -73,37 +73,37 @@ fn error_2_pixels_and_field_of_view_half(bencher: Bencher<'_, '_>, eye: Eye) {
 
 #[divan::bench(args = EYES)]
 fn order_of_error_1_pixel(bencher: Bencher<'_, '_>, eye: Eye) {
-    let scene = Scene::new(eye, Culling::Frustum);
+    let scene = SelectionInput::new(eye, Culling::Frustum);
     ordered(bencher, &scene, &[Criterion::ScreenSpaceError { pixels: 1.0 }]);
 }
 
 #[divan::bench]
 fn order_of_all_leaves(bencher: Bencher<'_, '_>) {
-    ordered(bencher, &Scene::new(Eye::Inside, Culling::Off), &[Criterion::FullResolution]);
+    ordered(bencher, &SelectionInput::new(Eye::Inside, Culling::Off), &[Criterion::FullResolution]);
 }
 
 fn culled(bencher: Bencher<'_, '_>, eye: Eye, criteria: &[Criterion]) {
-    let scene = Scene::new(eye, Culling::Frustum);
+    let scene = SelectionInput::new(eye, Culling::Frustum);
     bencher.bench(|| scene.select(criteria));
 }
 
-fn ordered(bencher: Bencher<'_, '_>, scene: &Scene, criteria: &[Criterion]) {
+fn ordered(bencher: Bencher<'_, '_>, scene: &SelectionInput, criteria: &[Criterion]) {
     let drawn: Vec<BrickId> = scene.select(criteria).drawn().collect();
     bencher.bench(|| back_to_front(&scene.layout, &scene.grid, &scene.view.camera, &drawn));
 }
 
-struct Scene {
+struct SelectionInput {
     layout: BrickLayout,
     grid: Grid,
     view: View,
 }
 
-impl Scene {
-    fn new(eye: Eye, culling: Culling) -> Scene {
+impl SelectionInput {
+    fn new(eye: Eye, culling: Culling) -> SelectionInput {
         let dims = UVec3::splat(32 * BrickSide::S32.n_cells() + 1);
         let grid = Grid::axis_aligned(dims, DVec3::ONE).expect("a plain grid");
         let view = View { camera: camera(&grid, eye), size: UVec2::new(1920, 1080), culling };
-        Scene { layout: BrickLayout::new(dims, BrickSide::S32), grid, view }
+        SelectionInput { layout: BrickLayout::new(dims, BrickSide::S32), grid, view }
     }
 
     fn select(&self, criteria: &[Criterion]) -> Selection {

@@ -19,7 +19,7 @@ const TOLERANCE: f64 = 1e-12;
 /// outside; one near an edge of the frustum may lie outside and be rendered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frustum {
-    planes: [Plane; N_PLANES],
+    planes: [HalfSpace; N_PLANES],
 }
 
 /// The set of a frustum's planes of which a brick has not been found to lie wholly inside. All, by default.
@@ -41,7 +41,7 @@ impl Default for Planes {
 
 /// The half space normal . p + offset >= 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Plane {
+struct HalfSpace {
     normal: DVec3,
     offset: f64,
     tolerance: f64,
@@ -54,7 +54,7 @@ impl Frustum {
         let half = rays.corner().abs();
         let (right, up, forward) = (camera.right(), camera.up(), camera.forward());
         let to_index = |toward: DVec3, depth: f64, margin: f64| {
-            Plane::in_index_space(grid, camera.eye(), toward + forward * depth, margin)
+            HalfSpace::in_index_space(grid, camera.eye(), toward + forward * depth, margin)
         };
         // Perspective: the planes tilt with the depth and pass the eye. Orthographic: they stand off it.
         let side = |toward: DVec3, half: f64| match rays.depth() {
@@ -99,14 +99,14 @@ impl Filter for Frustum {
     }
 }
 
-impl Plane {
+impl HalfSpace {
     /// The world's half space normal . (p - eye) + margin >= 0, in index space.
-    fn in_index_space(grid: &Grid, eye: DVec3, normal: DVec3, margin: f64) -> Plane {
+    fn in_index_space(grid: &Grid, eye: DVec3, normal: DVec3, margin: f64) -> HalfSpace {
         let DAffine3 { matrix3, translation } = grid.index_to_world();
         let (normal, margin) = (normal / normal.length(), margin / normal.length());
         let index_normal = matrix3.transpose() * normal;
         let reach = index_normal.abs().dot(grid.dims().as_dvec3());
         let scale = translation.abs().max_element() + eye.abs().max_element() + margin + reach;
-        Plane { normal: index_normal, offset: normal.dot(translation - eye) + margin, tolerance: TOLERANCE * scale }
+        HalfSpace { normal: index_normal, offset: normal.dot(translation - eye) + margin, tolerance: TOLERANCE * scale }
     }
 }

@@ -18,7 +18,7 @@ use brickfield_core::{BrickId, BrickLayout, Camera, Grid, Level, Projection, Wor
 /// From 2^32 bricks on.
 pub fn back_to_front(layout: &BrickLayout, grid: &Grid, camera: &Camera, bricks: &[BrickId]) -> Vec<usize> {
     let viewer = Viewer::new(grid, camera);
-    let mut placed: Vec<Placed> = bricks.iter().enumerate().map(|(at, id)| Placed::new(*id, at)).collect();
+    let mut placed: Vec<OrderedBrick> = bricks.iter().enumerate().map(|(at, id)| OrderedBrick::new(*id, at)).collect();
     let mut scratch = placed.clone();
     let mut order = vec![0; bricks.len()];
     part(layout, &viewer, layout.root(), &mut placed, &mut scratch, &mut order);
@@ -27,7 +27,7 @@ pub fn back_to_front(layout: &BrickLayout, grid: &Grid, camera: &Camera, bricks:
 
 /// A brick among the bricks of level 0: the first one that it covers.
 #[derive(Clone, Copy)]
-struct Placed {
+struct OrderedBrick {
     first: UVec3,
     at: u32,
 }
@@ -71,8 +71,8 @@ fn part(
     layout: &BrickLayout,
     viewer: &Viewer,
     node: BrickId,
-    bricks: &mut [Placed],
-    scratch: &mut [Placed],
+    bricks: &mut [OrderedBrick],
+    scratch: &mut [OrderedBrick],
     order: &mut [usize],
 ) {
     if bricks.len() < 2 || node.level == Level(0) {
@@ -80,7 +80,7 @@ fn part(
     }
     // The octant opposite to the one that rays reach first is drawn first.
     let first_drawn = !viewer.first_reached(layout, node) & (N_OCTANTS - 1);
-    let rank = |brick: &Placed| brick.octant(node.level) ^ first_drawn;
+    let rank = |brick: &OrderedBrick| brick.octant(node.level) ^ first_drawn;
     if node.level == Level(1) {
         bricks.sort_unstable_by_key(rank);
         return write(bricks, order);
@@ -93,12 +93,16 @@ fn part(
     }
 }
 
-fn write(bricks: &[Placed], order: &mut [usize]) {
+fn write(bricks: &[OrderedBrick], order: &mut [usize]) {
     order.iter_mut().zip(bricks).for_each(|(place, brick)| *place = brick.at as usize);
 }
 
 /// Sorts by rank; returns where each rank ends.
-fn scatter(from: &[Placed], to: &mut [Placed], rank: impl Fn(&Placed) -> usize) -> [usize; N_OCTANTS] {
+fn scatter(
+    from: &[OrderedBrick],
+    to: &mut [OrderedBrick],
+    rank: impl Fn(&OrderedBrick) -> usize,
+) -> [usize; N_OCTANTS] {
     let mut ends = [0; N_OCTANTS];
     from.iter().for_each(|brick| ends[rank(brick)] += 1);
     let mut n = 0;
@@ -113,10 +117,10 @@ fn scatter(from: &[Placed], to: &mut [Placed], rank: impl Fn(&Placed) -> usize) 
     ends
 }
 
-impl Placed {
-    fn new(id: BrickId, at: usize) -> Placed {
+impl OrderedBrick {
+    fn new(id: BrickId, at: usize) -> OrderedBrick {
         let at = u32::try_from(at).expect("fewer than 2^32 bricks");
-        Placed { first: id.coords << u32::from(id.level.0).min(u32::BITS - 1), at }
+        OrderedBrick { first: id.coords << u32::from(id.level.0).min(u32::BITS - 1), at }
     }
 
     /// In which octant of a node of `level` it lies: one bit per axis, x lowest.

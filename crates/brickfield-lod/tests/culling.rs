@@ -6,10 +6,10 @@ use brickfield_core::glam::{DMat3, DVec2, DVec3, UVec2, UVec3, Vec3Swizzles};
 use brickfield_core::{BrickLayout, BrickSide, Camera, Grid, Projection, Ray};
 use brickfield_lod::{Answer, Criterion, Culling, Filter, Frustum, Tile, View, select_cut};
 use proptest::prelude::*;
-use scene::{Scene, criteria, scene};
+use scene::{SelectionInput, criteria, scene};
 
 /// In index space; the parameter stays in world units.
-fn rays(scene: &Scene) -> Vec<Ray> {
+fn rays(scene: &SelectionInput) -> Vec<Ray> {
     let View { camera, size, .. } = scene.view;
     let (rays, to_index) = (camera.pixel_rays(size), scene.grid.world_to_index());
     let pixels = (0..size.y).flat_map(|y| (0..size.x).map(move |x| DVec2::new(f64::from(x), f64::from(y)) + 0.5));

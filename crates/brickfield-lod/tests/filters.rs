@@ -6,13 +6,13 @@ use brickfield_core::glam::Vec3Swizzles;
 use brickfield_core::{BrickId, Level};
 use brickfield_lod::{Answer, Criterion, Culling, Filter, Frustum, Selection, Tile, select_by, select_cut};
 use proptest::prelude::*;
-use scene::{Scene, criteria, criterion, scene};
+use scene::{SelectionInput, criteria, criterion, scene};
 
-fn by<F: Filter>(scene: &Scene, filter: F) -> Selection {
+fn by<F: Filter>(scene: &SelectionInput, filter: F) -> Selection {
     select_by(&scene.layout, &scene.grid, filter)
 }
 
-fn frustum(scene: &Scene) -> Frustum {
+fn frustum(scene: &SelectionInput) -> Frustum {
     Frustum::new(&scene.grid, &scene.view.camera, scene.view.size)
 }
 

@@ -8,14 +8,14 @@ use brickfield_core::glam::{DMat3, DVec3, UVec2, UVec3};
 use brickfield_core::{BrickId, BrickLayout, BrickSide, Camera, Grid, IndexPos, Level, Projection, WorldPos};
 use brickfield_lod::{Criterion, Culling, Selection, View, select_cut};
 use proptest::prelude::*;
-use scene::{Scene, criteria, criterion, scene};
+use scene::{SelectionInput, criteria, criterion, scene};
 
-fn select(scene: &Scene, criteria: &[Criterion]) -> Selection {
+fn select(scene: &SelectionInput, criteria: &[Criterion]) -> Selection {
     select_cut(&scene.layout, &scene.grid, &scene.view, criteria)
 }
 
 /// The corners of the box of a brick's samples in the world.
-fn corners(scene: &Scene, id: BrickId) -> [DVec3; 8] {
+fn corners(scene: &SelectionInput, id: BrickId) -> [DVec3; 8] {
     scene.layout.sample_box(id).corners().map(|c| scene.grid.world(IndexPos(c + 0.5)).0)
 }
 
@@ -24,7 +24,7 @@ fn greatest<T: Copy>(all: &[T], between: impl Fn(T, T) -> f64) -> f64 {
 }
 
 /// How many times too coarse a brick is by the words of a criterion: it is fine enough up to 1.
-fn coarseness(scene: &Scene, criterion: &Criterion, id: BrickId) -> f64 {
+fn coarseness(scene: &SelectionInput, criterion: &Criterion, id: BrickId) -> f64 {
     let (corners, camera) = (corners(scene, id), scene.view.camera);
     let distance = |point: DVec3, factor: f64| {
         let diagonal = (0..4).map(|i| corners[i].distance(corners[7 - i])).fold(0.0, f64::max);
@@ -57,7 +57,7 @@ fn field_of_view(corners: &[DVec3; 8], camera: &Camera, fraction: f64, holds_eye
 }
 
 /// Length of a brick's voxels in pixels where the brick is nearest.
-fn voxel_pixels(scene: &Scene, id: BrickId) -> f64 {
+fn voxel_pixels(scene: &SelectionInput, id: BrickId) -> f64 {
     let View { camera, size, .. } = scene.view;
     let axes = (0..3).filter(|axis| scene.layout.dims()[*axis] > 1);
     let voxel = axes.map(|axis| scene.grid.spacing()[axis]).fold(0.0, f64::max) * f64::from(1 << id.level.0);
@@ -72,14 +72,14 @@ fn voxel_pixels(scene: &Scene, id: BrickId) -> f64 {
 }
 
 /// Whether the eye lies in a brick's tile, grown by some voxels.
-fn holds_eye(scene: &Scene, id: BrickId, voxels: f64) -> bool {
+fn holds_eye(scene: &SelectionInput, id: BrickId, voxels: f64) -> bool {
     let b = scene.layout.sample_box(id);
     let eye = scene.grid.index(WorldPos(scene.view.camera.eye())).0 - 0.5;
     eye.cmpge(b.min - voxels).all() && eye.cmple(b.max + voxels).all()
 }
 
 /// Whether rounding may put the eye inside a tile or outside.
-fn is_eye_on_face(scene: &Scene, id: BrickId) -> bool {
+fn is_eye_on_face(scene: &SelectionInput, id: BrickId) -> bool {
     holds_eye(scene, id, 1e-4) != holds_eye(scene, id, -1e-4)
 }
 

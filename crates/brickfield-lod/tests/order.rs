@@ -6,10 +6,10 @@ use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickId, BrickLayout, BrickSide, Camera, Grid, Level, Projection, Ray};
 use brickfield_lod::{Answer, Criterion, Culling, Filter, Tile, View, back_to_front, select_by};
 use proptest::prelude::*;
-use scene::{Scene, criteria, scene};
+use scene::{SelectionInput, criteria, scene};
 
 /// Rays in index space; the parameter stays in world units. At most 8 x 8 pixels.
-fn rays(scene: &Scene) -> Vec<Ray> {
+fn rays(scene: &SelectionInput) -> Vec<Ray> {
     let View { camera, size, .. } = scene.view;
     let size = size.min(UVec2::splat(8));
     let (rays, to_index) = (camera.pixel_rays(size), scene.grid.world_to_index());
@@ -22,7 +22,7 @@ fn rays(scene: &Scene) -> Vec<Ray> {
 }
 
 /// Some bricks of a random cut, which is at least as fine as the criteria ask for, in an order of their own.
-fn bricks(scene: &Scene, criteria: &[Criterion], seed: u32) -> Vec<BrickId> {
+fn bricks(scene: &SelectionInput, criteria: &[Criterion], seed: u32) -> Vec<BrickId> {
     let noise = |id: BrickId| {
         let place = id.coords * UVec3::new(73_856_093, 19_349_663, 83_492_791);
         (place.element_sum() ^ u32::from(id.level.0) ^ seed).wrapping_mul(0x9e37_79b9) >> 16
@@ -39,7 +39,7 @@ fn bricks(scene: &Scene, criteria: &[Criterion], seed: u32) -> Vec<BrickId> {
 }
 
 /// Parameters at which a ray enters the bricks it meets, each with the brick's place in the drawing.
-fn met(scene: &Scene, drawn: &[BrickId], ray: &Ray) -> Vec<(f64, usize)> {
+fn met(scene: &SelectionInput, drawn: &[BrickId], ray: &Ray) -> Vec<(f64, usize)> {
     let boxes = drawn.iter().enumerate().map(|(place, id)| (place, scene.layout.index_box(*id)));
     boxes.filter_map(|(place, b)| Some((ray.clip(&b)?.start, place))).collect()
 }

@@ -6,9 +6,9 @@ use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{BrickId, Cut};
 use brickfield_lod::{Criterion, Culling, Selection, select_cut};
 use proptest::prelude::*;
-use scene::{Scene, criteria, scene};
+use scene::{SelectionInput, criteria, scene};
 
-fn select(scene: &Scene, criteria: &[Criterion]) -> Selection {
+fn select(scene: &SelectionInput, criteria: &[Criterion]) -> Selection {
     select_cut(&scene.layout, &scene.grid, &scene.view, criteria)
 }
 

@@ -2,7 +2,7 @@
 
 use brickfield_core::{Grid, Knot, LinearRgb, TransferFunction, Volume};
 
-use crate::histogram::{Classes, Histogram, otsu_cuts, triangle_foot};
+use crate::histogram::{Classes, VolumeHistogram, otsu_cuts, triangle_foot};
 
 /// A transfer function in which the thing in the volume is likely to be recognised, found from its histogram alone.
 ///
@@ -19,7 +19,7 @@ use crate::histogram::{Classes, Histogram, otsu_cuts, triangle_foot};
 /// Deterministic; at most four passes over the voxels. A constant volume is a translucent grey block. Not for volumes
 /// whose background is their brightest value: such volumes need a transfer-function file.
 pub fn automatic(volume: &Volume) -> TransferFunction {
-    let histogram = Histogram::without_padding(volume);
+    let histogram = VolumeHistogram::without_padding(volume);
     let knots = if histogram.is_constant() {
         vec![Knot {
             value: volume.range().min,
@@ -49,7 +49,7 @@ const MAX_VOXEL_DEPTH: f64 = 1.0;
 const COLORS: [LinearRgb; 3] = [[0.10, 0.25, 0.55], [0.70, 0.18, 0.03], [1.0, 0.93, 0.80]];
 
 /// The background: its value, the greatest value of its noise, and the first bin above that.
-struct Background {
+struct BackgroundPeak {
     value: f64,
     noise_end: f64,
     end_bin: usize,
@@ -62,17 +62,17 @@ struct Material {
     color: LinearRgb,
 }
 
-fn background(h: &Histogram) -> Background {
+fn background(h: &VolumeHistogram) -> BackgroundPeak {
     let n = h.n_bins();
     let cut = otsu_cuts(h, 0, n, Classes::Two).first().copied().unwrap_or(1);
     let peak = h.mode(0, cut);
     let foot = triangle_foot(h, peak, n);
     let noise_bins = (foot - peak) + (foot - peak) / 2 + n / 100;
     let end_bin = (peak + noise_bins + 1).min(n - 1).min(cut.max(foot + 1));
-    Background { value: h.value(peak), noise_end: h.value(end_bin - 1), end_bin }
+    BackgroundPeak { value: h.value(peak), noise_end: h.value(end_bin - 1), end_bin }
 }
 
-fn materials(h: &Histogram, background: &Background, volume: &Volume) -> Vec<Material> {
+fn materials(h: &VolumeHistogram, background: &BackgroundPeak, volume: &Volume) -> Vec<Material> {
     let n = h.n_bins();
     let mut ends = vec![background.end_bin];
     ends.extend(otsu_cuts(h, background.end_bin, n, Classes::Three));
@@ -108,7 +108,7 @@ fn extinction(wanted: f64) -> f64 {
     wanted.clamp(0.0, TransferFunction::MAX_EXTINCTION)
 }
 
-fn knots(background: &Background, materials: &[Material]) -> Vec<Knot> {
+fn knots(background: &BackgroundPeak, materials: &[Material]) -> Vec<Knot> {
     let Some(first) = materials.first() else { return vec![] };
     let edge = (1.0 - EDGE) * background.value + EDGE * first.median;
     let foot = edge.max(background.noise_end).min(first.median);

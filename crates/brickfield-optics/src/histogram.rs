@@ -4,7 +4,7 @@ use brickfield_core::{Scalar, ScalarType, ValueRange, Volume, with_voxels};
 
 /// Counts of data values in bins of one width; values outside the range are not counted.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Histogram {
+pub(crate) struct VolumeHistogram {
     range: ValueRange,
     width: f64,
     bins: Vec<Bin>,
@@ -27,16 +27,16 @@ const LEAST_OCCUPIED: usize = 32;
 /// Looks at the volume at most so often.
 const MAX_PASSES: usize = 4;
 
-impl Histogram {
+impl VolumeHistogram {
     /// The histogram of a volume without its padding: lone values at either end (-1500 below air at -1000, 1e30 where
     /// nothing was measured). A lone 0 at the low end is a background, not padding.
-    pub(crate) fn without_padding(volume: &Volume) -> Histogram {
-        let whole = Histogram::over(volume, volume.range());
+    pub(crate) fn without_padding(volume: &Volume) -> VolumeHistogram {
+        let whole = VolumeHistogram::over(volume, volume.range());
         let mut kept = whole.clone();
         let mut candidate = whole;
         for _ in 1..MAX_PASSES {
             let Some(range) = candidate.range_without_a_lone_end() else { break };
-            candidate = Histogram::over(volume, range);
+            candidate = VolumeHistogram::over(volume, range);
             if candidate.n_occupied() >= LEAST_OCCUPIED {
                 kept = candidate.clone();
             }
@@ -44,19 +44,19 @@ impl Histogram {
         kept
     }
 
-    fn over(volume: &Volume, range: ValueRange) -> Histogram {
+    fn over(volume: &Volume, range: ValueRange) -> VolumeHistogram {
         let span = range.max - range.min;
         let width = match volume.scalar_type() {
             ScalarType::F32 | ScalarType::F64 => span / MAX_BINS as f64,
             _ => ((span + 1.0) / MAX_BINS as f64).ceil(),
         };
         if !(width.is_finite() && width > 0.0) {
-            return Histogram { range, width: 0.0, bins: vec![Bin { count: 1, min: range.min, max: range.max }] };
+            return VolumeHistogram { range, width: 0.0, bins: vec![Bin { count: 1, min: range.min, max: range.max }] };
         }
         let n = ((span / width) as usize + 1).min(MAX_BINS);
         let mut bins = vec![Bin { count: 0, min: f64::INFINITY, max: f64::NEG_INFINITY }; n];
         with_voxels!(volume.voxels(), v => count(v, range, width, &mut bins));
-        Histogram { range, width, bins }
+        VolumeHistogram { range, width, bins }
     }
 
     /// The range of values that are counted.
@@ -144,7 +144,7 @@ fn count<T: Scalar>(values: &[T], range: ValueRange, width: f64, bins: &mut [Bin
 
 /// Cuts the bins `from..to` into at most three classes of least variance within (Otsu 1979, eq. 13-18, exhaustively);
 /// the first bin of every class but the first. Empty classes are left out.
-pub(crate) fn otsu_cuts(h: &Histogram, from: usize, to: usize, n_classes: Classes) -> Vec<usize> {
+pub(crate) fn otsu_cuts(h: &VolumeHistogram, from: usize, to: usize, n_classes: Classes) -> Vec<usize> {
     let sums = Sums::new(h, from, to);
     let mut best = (0.0, vec![]);
     for a in from + 1..to {
@@ -179,7 +179,7 @@ struct Sums {
 }
 
 impl Sums {
-    fn new(h: &Histogram, from: usize, to: usize) -> Sums {
+    fn new(h: &VolumeHistogram, from: usize, to: usize) -> Sums {
         let n = h.total(from, to).max(1) as f64;
         // In bins, not values: their squares stay finite.
         let at = |b: usize| (h.value(b) - h.range.min) / h.width;
@@ -203,7 +203,7 @@ impl Sums {
 
 /// The foot of the slope that falls from the bin `peak` to the last bin before `to`: the bin farthest below the line
 /// between the two (Zack, Rogers and Latt 1977, the triangle method).
-pub(crate) fn triangle_foot(h: &Histogram, peak: usize, to: usize) -> usize {
+pub(crate) fn triangle_foot(h: &VolumeHistogram, peak: usize, to: usize) -> usize {
     let (high, low) = (h.count(peak) as f64, h.count(to - 1) as f64);
     let slope = (low - high) / ((to - 1 - peak) as f64).max(1.0);
     let below = |b: usize| high + slope * (b - peak) as f64 - h.count(b) as f64;
@@ -226,7 +226,7 @@ mod tests {
         let mut values: Vec<f32> = (0..1000).map(|i| i as f32 / 10.0).collect();
         values.extend([-9999.0; 40]);
         values.extend([1e30; 40]);
-        let h = Histogram::without_padding(&volume(values));
+        let h = VolumeHistogram::without_padding(&volume(values));
         assert_eq!(h.range(), ValueRange { min: 0.0, max: f64::from(99.9f32) });
         assert_eq!(h.total(0, h.n_bins()), 1000);
     }
@@ -234,15 +234,15 @@ mod tests {
     #[test]
     fn labels_and_masks_are_not_padding() {
         let masked = volume((0..200u8).map(|i| if i < 60 { 0 } else { i }).collect());
-        assert_eq!(Histogram::without_padding(&masked).range().min, 0.0);
-        let h = Histogram::without_padding(&volume(vec![0u8, 0, 0, 255, 255]));
+        assert_eq!(VolumeHistogram::without_padding(&masked).range().min, 0.0);
+        let h = VolumeHistogram::without_padding(&volume(vec![0u8, 0, 0, 255, 255]));
         assert_eq!(h.range(), ValueRange { min: 0.0, max: 255.0 });
     }
 
     #[test]
     fn otsu_parts_three_heaps() {
         let heaps = [10u8, 11, 12, 100, 101, 102, 200, 201, 202];
-        let h = Histogram::without_padding(&volume(heaps.to_vec()));
+        let h = VolumeHistogram::without_padding(&volume(heaps.to_vec()));
         let cuts = otsu_cuts(&h, 0, h.n_bins(), Classes::Three);
         let classes: Vec<u64> = [0, cuts[0], cuts[1], h.n_bins()].windows(2).map(|w| h.total(w[0], w[1])).collect();
         assert_eq!(classes, [3, 3, 3]);
@@ -253,7 +253,7 @@ mod tests {
     fn the_foot_of_a_spike_is_beside_it() {
         let mut values = vec![0u8; 10_000];
         values.extend(1..=255u8);
-        let h = Histogram::without_padding(&volume(values));
+        let h = VolumeHistogram::without_padding(&volume(values));
         assert!((1..=3).contains(&triangle_foot(&h, 0, h.n_bins())));
     }
 }

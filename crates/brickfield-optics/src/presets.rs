@@ -94,7 +94,7 @@ impl Preset {
             PresetScale::Hounsfield => (0.0, 1.0, 1.0),
             PresetScale::Relative => (range.min, range.max - range.min, 1.0 / length_world),
         };
-        let knot = |&(at, extinction, color): &Point| Knot {
+        let knot = |&(at, extinction, color): &PresetKnot| Knot {
             value: start + at * span,
             extinction: extinction * per_depth,
             color: linear_of_hex(color),
@@ -114,7 +114,7 @@ impl Preset {
         self.transfer(volume.range(), diagonal_world(volume.grid()))
     }
 
-    fn points(self) -> &'static [Point] {
+    fn points(self) -> &'static [PresetKnot] {
         match self {
             Preset::CtBone => &CT_BONE,
             Preset::CtSoftTissue => &CT_SOFT_TISSUE,
@@ -142,19 +142,19 @@ pub enum PresetScale {
 }
 
 /// Value, extinction and sRGB colour; units as in [`PresetScale`].
-type Point = (f64, f64, u32);
+type PresetKnot = (f64, f64, u32);
 
 /// Optical depth of the brightest value over the volume's diagonal.
 const FULL: f64 = 60.0;
 
-const CT_BONE: [Point; 5] = [
+const CT_BONE: [PresetKnot; 5] = [
     (150.0, 0.0, 0x5a1e14),
     (280.0, 0.03, 0xa8603c),
     (600.0, 0.35, 0xe8cfa0),
     (1200.0, 1.0, 0xfff8ea),
     (3000.0, 1.5, 0xffffff),
 ];
-const CT_SOFT_TISSUE: [Point; 6] = [
+const CT_SOFT_TISSUE: [PresetKnot; 6] = [
     (-10.0, 0.0, 0x4a1010),
     (30.0, 0.012, 0x9a3a28),
     (80.0, 0.03, 0xc05038),
@@ -162,7 +162,7 @@ const CT_SOFT_TISSUE: [Point; 6] = [
     (300.0, 0.35, 0xf4d8b0),
     (1200.0, 0.6, 0xfffaf0),
 ];
-const CT_LUNG: [Point; 7] = [
+const CT_LUNG: [PresetKnot; 7] = [
     (-970.0, 0.0, 0x102848),
     (-880.0, 0.003, 0x3c78a8),
     (-700.0, 0.012, 0x78b0d8),
@@ -171,16 +171,16 @@ const CT_LUNG: [Point; 7] = [
     (250.0, 0.0, 0xd8c8a8),
     (900.0, 0.04, 0xfff8ea),
 ];
-const CT_SKIN: [Point; 4] =
+const CT_SKIN: [PresetKnot; 4] =
     [(-450.0, 0.0, 0x502818), (-250.0, 0.15, 0xb07858), (0.0, 0.8, 0xe8b898), (300.0, 1.5, 0xf8e0cc)];
-const MR_DEFAULT: [Point; 5] =
+const MR_DEFAULT: [PresetKnot; 5] =
     [(0.1, 0.0, 0x301c18), (0.25, 1.5, 0x80483c), (0.5, 12.0, 0xc88c70), (0.75, 40.0, 0xf0d8c0), (1.0, 80.0, 0xffffff)];
-const RAMP: [Point; 2] = [(0.05, 0.0, 0xffffff), (1.0, 20.0, 0xffffff)];
-const GRAY: [Point; 2] = [(0.05, 0.0, 0x000000), (1.0, FULL, 0xffffff)];
+const RAMP: [PresetKnot; 2] = [(0.05, 0.0, 0xffffff), (1.0, 20.0, 0xffffff)];
+const GRAY: [PresetKnot; 2] = [(0.05, 0.0, 0x000000), (1.0, FULL, 0xffffff)];
 
 /// Nine equidistant colours of a map, the first transparent, extinction rising with the square of the value: rare, high
 /// values show through common, low ones.
-const fn rising(colors: [u32; 9]) -> [Point; 9] {
+const fn rising(colors: [u32; 9]) -> [PresetKnot; 9] {
     let mut points = [(0.0, 0.0, 0); 9];
     let mut i = 0;
     while i < 9 {
@@ -191,15 +191,15 @@ const fn rising(colors: [u32; 9]) -> [Point; 9] {
     points
 }
 
-const VIRIDIS: [Point; 9] =
+const VIRIDIS: [PresetKnot; 9] =
     rising([0x440154, 0x472d7b, 0x3b528b, 0x2c728e, 0x21918c, 0x27ad81, 0x5cc863, 0xaadc32, 0xfde725]);
-const INFERNO: [Point; 9] =
+const INFERNO: [PresetKnot; 9] =
     rising([0x000004, 0x210c4a, 0x57106e, 0x8a226a, 0xbc3754, 0xe35933, 0xf98c0a, 0xf9c932, 0xfcffa4]);
-const MAGMA: [Point; 9] =
+const MAGMA: [PresetKnot; 9] =
     rising([0x000004, 0x1d1147, 0x51127c, 0x832681, 0xb73779, 0xe55064, 0xfb8761, 0xfec287, 0xfcfdbf]);
-const PLASMA: [Point; 9] =
+const PLASMA: [PresetKnot; 9] =
     rising([0x0d0887, 0x4c02a1, 0x7e03a8, 0xaa2395, 0xcc4778, 0xe56b5d, 0xf89441, 0xfdc328, 0xf0f921]);
-const COOL_WARM: [Point; 4] =
+const COOL_WARM: [PresetKnot; 4] =
     [(0.0, FULL, 0x3b4cc0), (0.48, 0.0, 0xdddddd), (0.52, 0.0, 0xdddddd), (1.0, FULL, 0xb40426)];
 
 #[cfg(test)]

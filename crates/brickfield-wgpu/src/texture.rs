@@ -13,14 +13,14 @@ use crate::device::Device;
 pub(crate) struct Texture {
     texture: wgpu::Texture,
     pub(crate) view: wgpu::TextureView,
-    shape: Shape,
+    shape: SlotShape,
     format: SampleFormat,
     held: HeldChunks,
 }
 
 /// How slots lie in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Shape {
+enum SlotShape {
     Atlas(AtlasShape),
     /// As the table of their places says.
     Table(UVec3),
@@ -52,8 +52,8 @@ impl Texture {
     /// How bricks lie in it.
     pub(crate) fn atlas_shape(&self) -> Option<AtlasShape> {
         match self.shape {
-            Shape::Atlas(shape) => Some(shape),
-            Shape::Table(_) => None,
+            SlotShape::Atlas(shape) => Some(shape),
+            SlotShape::Table(_) => None,
         }
     }
 
@@ -62,9 +62,9 @@ impl Texture {
         let limit = device.description.capabilities.max_texture_3d;
         let old = old.filter(|old| old.format == slots.format());
         match (slots.places(), old) {
-            (Places::Table { texels, .. }, Some(old)) if old.shape == Shape::Table(*texels) => Ok(old),
+            (Places::Table { texels, .. }, Some(old)) if old.shape == SlotShape::Table(*texels) => Ok(old),
             (Places::Table { texels, .. }, _) => match texels.max_element() <= limit {
-                true => Texture::empty(device, Shape::Table(*texels), slots.format()),
+                true => Texture::empty(device, SlotShape::Table(*texels), slots.format()),
                 false => Err(RenderError::TextureTooLarge { texels: *texels, limit }),
             },
             (Places::Even(side), old) => {
@@ -78,15 +78,15 @@ impl Texture {
                     }
                     Some((shape, old)) if shape.n_bricks() < needed => match shape.grown(needed, limit) {
                         Some(grown) => old.grown(device, grown),
-                        None => Texture::empty(device, Shape::Atlas(least.ok_or(too_large)?), slots.format()),
+                        None => Texture::empty(device, SlotShape::Atlas(least.ok_or(too_large)?), slots.format()),
                     },
-                    _ => Texture::empty(device, Shape::Atlas(least.ok_or(too_large)?), slots.format()),
+                    _ => Texture::empty(device, SlotShape::Atlas(least.ok_or(too_large)?), slots.format()),
                 }
             }
         }
     }
 
-    fn empty(device: &Device, shape: Shape, format: SampleFormat) -> Result<Texture, RenderError> {
+    fn empty(device: &Device, shape: SlotShape, format: SampleFormat) -> Result<Texture, RenderError> {
         let texels = shape.texels();
         let n_bytes = texels.to_array().into_iter().map(u64::from).product::<u64>() * format.n_bytes() as u64;
         let stored = stored_as(device, format)?;
@@ -110,11 +110,11 @@ impl Texture {
 
     /// A larger atlas with this one's bricks at their places; without them if both do not fit the device.
     fn grown(self, device: &Device, shape: AtlasShape) -> Result<Texture, RenderError> {
-        let larger = match Texture::empty(device, Shape::Atlas(shape), self.format) {
+        let larger = match Texture::empty(device, SlotShape::Atlas(shape), self.format) {
             Err(RenderError::OutOfMemory { .. }) => {
                 let format = self.format;
                 drop(self);
-                return Texture::empty(device, Shape::Atlas(shape), format);
+                return Texture::empty(device, SlotShape::Atlas(shape), format);
             }
             larger => larger?,
         };
@@ -137,8 +137,8 @@ impl Texture {
         let mut n_bytes = 0;
         device.checked("the atlas's samples", 0, || {
             n_bytes = match self.shape {
-                Shape::Atlas(shape) => self.write_bricks(device, slots, shape, &missing),
-                Shape::Table(_) => missing.iter().map(|slot| self.write_slot(device, slots, *slot)).sum(),
+                SlotShape::Atlas(shape) => self.write_bricks(device, slots, shape, &missing),
+                SlotShape::Table(_) => missing.iter().map(|slot| self.write_slot(device, slots, *slot)).sum(),
             };
             device.queue.submit([]);
         })?;
@@ -171,8 +171,8 @@ impl Texture {
         let Some(samples) = slots.samples(slot) else { return 0 };
         let (origin, size) = match (self.shape, slots.places()) {
             (_, Places::Table { places, .. }) => (places[slot as usize].texel, places[slot as usize].n),
-            (Shape::Atlas(shape), _) => (shape.origin(slot), UVec3::splat(shape.side.n_samples())),
-            (Shape::Table(_), Places::Even(_)) => return 0,
+            (SlotShape::Atlas(shape), _) => (shape.origin(slot), UVec3::splat(shape.side.n_samples())),
+            (SlotShape::Table(_), Places::Even(_)) => return 0,
         };
         self.write(device, samples.bytes(), origin, size);
         samples.bytes().len() as u64
@@ -200,11 +200,11 @@ impl Texture {
     }
 }
 
-impl Shape {
+impl SlotShape {
     fn texels(self) -> UVec3 {
         match self {
-            Shape::Atlas(shape) => shape.texels(),
-            Shape::Table(texels) => texels,
+            SlotShape::Atlas(shape) => shape.texels(),
+            SlotShape::Table(texels) => texels,
         }
     }
 }

@@ -12,17 +12,17 @@ use brickfield::io::WorldFrame;
 use brickfield::io::nrrd::{self, NrrdEncoding};
 
 /// A folder with a volume of 12 x 10 x 8 voxels, and the command run in it.
-struct Place {
+struct WorkFolder {
     folder: tempfile::TempDir,
 }
 
-impl Place {
-    fn new() -> Place {
+impl WorkFolder {
+    fn new() -> WorkFolder {
         let folder = tempfile::tempdir().unwrap();
         let grid = Grid::axis_aligned(UVec3::new(12, 10, 8), DVec3::new(1.0, 1.0, 4.22 + 6e-15)).unwrap();
         let volume = Volume::new(grid, (0..960).map(|i| (i % 251) as u8).collect::<Vec<_>>()).unwrap();
         nrrd::save(&folder.path().join("a.nrrd"), &volume, WorldFrame::Plain, NrrdEncoding::Raw).unwrap();
-        Place { folder }
+        WorkFolder { folder }
     }
 
     fn path(&self) -> &Path {
@@ -46,7 +46,7 @@ fn text(bytes: &[u8]) -> String {
 
 #[test]
 fn info_says_what_the_file_holds() {
-    let out = Place::new().run("info|a.nrrd");
+    let out = WorkFolder::new().run("info|a.nrrd");
     let said = text(&out.stdout);
     assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
     assert!(said.contains("12 x 10 x 8") && said.contains("1 x 1 x 4.22 units"), "{said}");
@@ -54,7 +54,7 @@ fn info_says_what_the_file_holds() {
 
 #[test]
 fn a_picture_is_written_and_what_the_volume_lacks_is_said() {
-    let place = Place::new();
+    let place = WorkFolder::new();
     let out = place.run("render|a.nrrd|-o|a.png|--backend|cpu|--size|8x6|--lod|9|--clip|0:6,0:10,0:99|--step|1/4");
     let said = text(&out.stderr);
     assert_eq!(out.status.code(), Some(0), "{said}");
@@ -64,7 +64,7 @@ fn a_picture_is_written_and_what_the_volume_lacks_is_said() {
 
 #[test]
 fn criteria_are_listed_or_repeated() {
-    let place = Place::new();
+    let place = WorkFolder::new();
     let said = |lod: &str| text(&place.run(&format!("render|a.nrrd|-o|a.png|--backend|cpu|--size|8x6|{lod}")).stderr);
     let both = said("--lod|7,error=2.5,poi=-1:2:3:0.5|--lod|9,fov,distance=2");
     assert!(both.contains("--lod 7: the volume has") && both.contains("--lod 9: the volume has"), "{both}");
@@ -73,7 +73,7 @@ fn criteria_are_listed_or_repeated() {
 
 const SMALL: &str = "--backend|cpu|--size|24x18";
 
-impl Place {
+impl WorkFolder {
     /// What is printed for a picture that is written.
     fn rendered(&self, picture: &str, words: &str) -> String {
         let out = self.run(&format!("render|a.nrrd|-o|{picture}|{SMALL}{words}"));
@@ -89,7 +89,7 @@ impl Place {
 
 #[test]
 fn what_a_picture_was_sampled_with_is_printed_and_kept() {
-    let place = Place::new();
+    let place = WorkFolder::new();
     let polygons = "divide bricks, lengths true, rays cast to the samples of polygons";
     for (words, expected) in [
         ("", "placement shells, divide rays, lengths true, rays cast\n".to_owned()),
@@ -117,7 +117,7 @@ fn what_a_picture_was_sampled_with_is_printed_and_kept() {
 
 #[test]
 fn polygons_imply_tessellated_shells_and_bricks() {
-    let place = Place::new();
+    let place = WorkFolder::new();
     let implied = place.pixels("|--polygons|rgba32float");
     assert_eq!(implied, place.pixels("|--placement|tessellated-shells|--divide|bricks"));
     assert!(implied.iter().any(|c| *c > 0));
@@ -125,7 +125,7 @@ fn polygons_imply_tessellated_shells_and_bricks() {
 
 #[test]
 fn bricks_are_shown_over_the_picture_and_in_the_legend() {
-    let place = Place::new();
+    let place = WorkFolder::new();
     let (plain, shown) = (place.pixels(""), place.pixels("|--show-bricks"));
     let n_changed = plain.chunks(3).zip(shown.chunks(3)).filter(|(a, b)| a != b).count();
     assert!(plain.len() == shown.len() && (20..24 * 18 / 2).contains(&n_changed), "{n_changed}");
@@ -136,7 +136,7 @@ fn bricks_are_shown_over_the_picture_and_in_the_legend() {
 
 #[test]
 fn bricks_that_show_nothing_are_boxes_only_if_all_are_asked_for() {
-    let place = Place::new();
+    let place = WorkFolder::new();
     let knot = |value: f64, extinction: f64| {
         format!(r##"{{"value": {value}, "extinction": {extinction}, "srgb": "#ffffff"}}"##)
     };
@@ -192,7 +192,7 @@ const REFUSED: [(&str, i32, &str); 34] = [
 
 #[test]
 fn what_is_refused_is_named_and_leaves_nothing_behind() {
-    let place = Place::new();
+    let place = WorkFolder::new();
     for (words, status, part) in REFUSED {
         let out = place.run(&format!("render|{words}"));
         let said = text(&out.stderr);
@@ -204,7 +204,7 @@ fn what_is_refused_is_named_and_leaves_nothing_behind() {
 
 #[test]
 fn a_reader_that_goes_away_is_no_failure() {
-    let place = Place::new();
+    let place = WorkFolder::new();
     let mut child = place.command("info|a.nrrd").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     drop(child.stdout.take());
     let mut said = String::new();

@@ -16,7 +16,7 @@ use serde::Serialize;
 
 /// Holds every backend to the f64 answer, case by case; with --self-check also the cases to their mutants
 #[derive(Parser)]
-struct Options {
+struct Arguments {
     /// Backends whose absence is a failure, separated by commas: cpu, wgpu, ash
     #[arg(long, value_delimiter = ',', value_name = "BACKENDS")]
     require: Vec<BackendKind>,
@@ -54,13 +54,13 @@ struct Options {
 
 /// The report as JSON.
 #[derive(Serialize)]
-struct Report {
+struct ConformanceReport {
     summary: Summary,
     outcomes: Vec<Outcome>,
 }
 
 fn main() -> anyhow::Result<ExitCode> {
-    let options = Options::parse();
+    let options = Arguments::parse();
     let cases = chosen(&options.case);
     if options.list {
         list(&cases);
@@ -76,7 +76,7 @@ fn main() -> anyhow::Result<ExitCode> {
     let summary = Summary::of(&outcomes);
     println!("{summary} in {:.1} s", begin.elapsed().as_secs_f64());
     if let Some(path) = &options.json {
-        let report = Report { summary, outcomes: std::mem::take(&mut outcomes) };
+        let report = ConformanceReport { summary, outcomes: std::mem::take(&mut outcomes) };
         let text = serde_json::to_string_pretty(&report)?;
         fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))?;
     }
@@ -94,7 +94,7 @@ struct Keeper {
 
 impl Keeper {
     /// Reads the earlier record before it creates one: both may be one file.
-    fn new(options: &Options) -> Result<Keeper, RecordError> {
+    fn new(options: &Arguments) -> Result<Keeper, RecordError> {
         let earlier = options.against.as_deref().map(read_record).transpose()?;
         let writer = options.digests.as_deref().map(RecordWriter::create).transpose()?;
         Ok(Keeper { writer, comparison: earlier.map(Comparison::with), failed: Ok(()) })
@@ -110,7 +110,7 @@ impl Keeper {
     }
 
     /// Completes the record and sums up the comparison; whether an answer has changed.
-    fn finish(self, options: &Options) -> Result<bool, RecordError> {
+    fn finish(self, options: &Arguments) -> Result<bool, RecordError> {
         self.failed?;
         if let (Some(writer), Some(path)) = (self.writer, &options.digests) {
             println!("record {}: {:.1} MB", path.display(), writer.finish()? as f64 / 1e6);
@@ -123,13 +123,13 @@ impl Keeper {
 }
 
 /// Whether a run with these options gives this answer, if the code still has its case and the machine its backend.
-fn is_asked_for(options: &Options, answer: &RecordEntry) -> bool {
+fn is_asked_for(options: &Arguments, answer: &RecordEntry) -> bool {
     let kind = BackendKind::ALL.into_iter().find(|kind| answer.backend.starts_with(&format!("{kind}@")));
     let is_case = options.case.is_empty() || options.case.iter().any(|text| answer.case.contains(text.as_str()));
     is_case && kind.is_none_or(|kind| is_wanted(options, kind))
 }
 
-fn is_wanted(options: &Options, kind: BackendKind) -> bool {
+fn is_wanted(options: &Arguments, kind: BackendKind) -> bool {
     options.backend.is_empty() || options.backend.contains(&kind) || options.require.contains(&kind)
 }
 
@@ -145,14 +145,14 @@ fn list(cases: &[Case]) {
     }
 }
 
-fn candidates(options: &Options) -> Vec<Candidate> {
+fn candidates(options: &Arguments) -> Vec<Candidate> {
     let validation = if options.validation { Validation::On } else { Validation::Off };
     let kinds = BackendKind::ALL.into_iter().filter(|kind| is_wanted(options, *kind));
     kinds.flat_map(|kind| Candidate::all(kind, options.adapter.as_deref(), validation)).collect()
 }
 
 /// Runs each case on all backends, and then, if asked for, against its mutants.
-fn run(options: &Options, cases: &[Case], keeper: &mut Keeper) -> Vec<Outcome> {
+fn run(options: &Arguments, cases: &[Case], keeper: &mut Keeper) -> Vec<Outcome> {
     let mut run =
         Run { candidates: candidates(options), required: options.require.clone(), pictures: options.pictures.clone() };
     let mut check = options.self_check.then(SelfCheck::default);
@@ -173,7 +173,7 @@ fn run(options: &Options, cases: &[Case], keeper: &mut Keeper) -> Vec<Outcome> {
 }
 
 /// Mutants that no case has caught; a part of the cases need not catch all.
-fn uncaught(options: &Options, check: &SelfCheck, candidates: &[Candidate]) -> Vec<Outcome> {
+fn uncaught(options: &Arguments, check: &SelfCheck, candidates: &[Candidate]) -> Vec<Outcome> {
     let uncaught = if options.case.is_empty() { check.uncaught(candidates) } else { Vec::new() };
     uncaught.iter().for_each(|outcome| println!("{outcome}"));
     let (n_caught, n) = check.n_caught();

@@ -14,7 +14,7 @@ use clap::Parser;
 /// Needs a Vulkan driver, and neither cargo nor another file. What finds no time or memory is left out and listed in the JSON.
 /// Exit codes: 0 good, 1 something is wrong (the JSON's `failures` say what), 2 bad arguments, 3 a backend is absent.
 #[derive(Parser)]
-struct Options {
+struct Arguments {
     /// Write the measurement to this file
     #[arg(long, value_name = "FILE", default_value = "gpu.json")]
     out: PathBuf,
@@ -39,7 +39,7 @@ struct Options {
 }
 
 fn main() -> anyhow::Result<ExitCode> {
-    let options = Options::parse();
+    let options = Arguments::parse();
     if !options.table.is_empty() {
         let reports = options.table.iter().map(|file| read(file)).collect::<anyhow::Result<Vec<_>>>()?;
         write!(std::io::stdout(), "{}", table(&reports))?;

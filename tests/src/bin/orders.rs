@@ -3,12 +3,12 @@
 use std::process::ExitCode;
 
 use brickfield::{BackendKind, Validation, open_backend};
-use brickfield_conformance::orders::{Row, backend_images, closed_forms, grid_refinement, rays, reference_images};
+use brickfield_conformance::orders::{OrderRow, backend_images, closed_forms, grid_refinement, rays, reference_images};
 use clap::Parser;
 
 /// Prints observed orders of accuracy against the claimed ones; fails if one is off by more than 0.1
 #[derive(Parser)]
-struct Options {
+struct Arguments {
     /// Backends whose absence is a failure, separated by commas: cpu, wgpu, ash
     #[arg(long, value_delimiter = ',', value_name = "BACKENDS")]
     require: Vec<BackendKind>,
@@ -21,7 +21,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    let options = Options::parse();
+    let options = Arguments::parse();
     println!("{:<44} {:>7} {:>9} {:>9}  errors, coarsest first", "what is halved", "claimed", "observed", "halvings");
     let mut holds = print(&rays()) & print(&reference_images());
     for kind in BackendKind::ALL {
@@ -39,7 +39,7 @@ fn main() -> ExitCode {
     if holds { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-fn on_backend(kind: BackendKind, options: &Options) -> bool {
+fn on_backend(kind: BackendKind, options: &Arguments) -> bool {
     match open_backend(kind, options.adapter.as_deref(), Validation::Off) {
         Ok(mut backend) => print(&backend_images(kind.name(), backend.as_mut())),
         Err(e) => {
@@ -50,7 +50,7 @@ fn on_backend(kind: BackendKind, options: &Options) -> bool {
 }
 
 /// Prints rows; whether all hold.
-fn print(rows: &[Row]) -> bool {
+fn print(rows: &[OrderRow]) -> bool {
     for row in rows {
         let (slope, n) = row.observed().map_or(("-".into(), 0), |o| (format!("{:.3}", o.slope), o.n_halvings));
         let errors: Vec<String> = row.errors.iter().map(|(_, e)| format!("{e:.1e}")).collect();
@@ -58,5 +58,5 @@ fn print(rows: &[Row]) -> bool {
         let claimed = if row.claims_floor() { format!("< {:.0e}", row.floor) } else { row.order.to_string() };
         println!("{:<44} {claimed:>7} {slope:>9} {n:>9}  {}{verdict}", row.what, errors.join(" "));
     }
-    rows.iter().all(Row::holds)
+    rows.iter().all(OrderRow::holds)
 }

@@ -7,7 +7,7 @@ use brickfield::options::progress_bar;
 use indicatif::ProgressBar;
 
 use super::CompareError;
-use super::output::{OutputError, Pictures, Shown};
+use super::output::{JudgedPicture, OutputError, Pictures};
 use super::rivals::Rivals;
 use super::sweep::{Priority, REACHED, SweepPoint};
 use crate::metrics::median;
@@ -16,7 +16,7 @@ use crate::turns::{Spread, order};
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Limits {
+pub(super) struct MeasureLimits {
     /// When the last frame must have been started, and be expected to end.
     pub(super) end: Instant,
     /// Most timed frames of each contestant.
@@ -27,14 +27,14 @@ pub(super) struct Contest<'a> {
     pub(super) points: &'a [SweepPoint],
     pub(super) rivals: &'a mut Rivals,
     pub(super) pictures: &'a Pictures<'a>,
-    pub(super) limits: Limits,
+    pub(super) limits: MeasureLimits,
 }
 
 /// One backend at one point: its first frame has been drawn and judged.
-struct Entry {
+struct BackendAtPoint {
     point: usize,
     rival: usize,
-    shown: Shown,
+    shown: JudgedPicture,
     warm_up: Timing,
     timed: Vec<Timing>,
     /// How long a frame takes altogether, upload and read-back included.
@@ -54,8 +54,8 @@ impl Contest<'_> {
         Ok((entries.into_iter().map(|e| self.row(e)).collect(), left_out))
     }
 
-    fn first_round(&mut self, bar: &ProgressBar) -> Result<(Vec<Entry>, Vec<LeftOut>), CompareError> {
-        let (mut entries, mut left_out): (Vec<Entry>, Vec<LeftOut>) = (Vec::new(), Vec::new());
+    fn first_round(&mut self, bar: &ProgressBar) -> Result<(Vec<BackendAtPoint>, Vec<LeftOut>), CompareError> {
+        let (mut entries, mut left_out): (Vec<BackendAtPoint>, Vec<LeftOut>) = (Vec::new(), Vec::new());
         // Half the time is for first frames, so that the other half is for timed ones; the leading points may take more.
         let begin = Instant::now();
         let half = begin + self.limits.end.saturating_duration_since(begin) / 2;
@@ -85,14 +85,15 @@ impl Contest<'_> {
     }
 
     /// Whether a smaller step is not needed any more: the pursued curve's error is below [`REACHED`].
-    fn is_reached(&self, entries: &[Entry], point: usize, rival: usize) -> bool {
+    fn is_reached(&self, entries: &[BackendAtPoint], point: usize, rival: usize) -> bool {
         let c = &self.points[point];
-        let reached = |e: &Entry| e.shown.errors.rmse < REACHED && like(&self.points[e.point], c) && e.rival == rival;
+        let reached =
+            |e: &BackendAtPoint| e.shown.errors.rmse < REACHED && like(&self.points[e.point], c) && e.rival == rival;
         c.priority == Priority::Pursuit && entries.iter().any(reached)
     }
 
     /// How long a first frame should take, by the same backend's last one of that rule and mode.
-    fn expected(&self, entries: &[Entry], point: usize, rival: usize) -> Duration {
+    fn expected(&self, entries: &[BackendAtPoint], point: usize, rival: usize) -> Duration {
         let c = &self.points[point];
         let last = entries.iter().rev().find(|e| e.rival == rival && like(&self.points[e.point], c));
         let Some(last) = last else { return Duration::ZERO };
@@ -101,7 +102,7 @@ impl Contest<'_> {
     }
 
     /// The inner error says why this frame could not be had; the outer one ends the comparison.
-    fn first_frame(&mut self, point: usize, rival: usize) -> Result<Result<Entry, String>, OutputError> {
+    fn first_frame(&mut self, point: usize, rival: usize) -> Result<Result<BackendAtPoint, String>, OutputError> {
         let (begin, c) = (Instant::now(), &self.points[point]);
         let backend = &mut self.rivals.present[rival];
         let Frame { image, timing, .. } = match backend.render(&c.plan) {
@@ -110,10 +111,10 @@ impl Contest<'_> {
         };
         let whole = begin.elapsed();
         let shown = self.pictures.judge(c, backend.describe(), &image)?;
-        Ok(shown.map(|shown| Entry { point, rival, shown, warm_up: timing, timed: Vec::new(), whole }))
+        Ok(shown.map(|shown| BackendAtPoint { point, rival, shown, warm_up: timing, timed: Vec::new(), whole }))
     }
 
-    fn round(&mut self, round: u32, entries: &mut Vec<Entry>, left_out: &mut Vec<LeftOut>, bar: &ProgressBar) {
+    fn round(&mut self, round: u32, entries: &mut Vec<BackendAtPoint>, left_out: &mut Vec<LeftOut>, bar: &ProgressBar) {
         let mut failed = Vec::new();
         for i in order(round, entries.len()) {
             let entry = &mut entries[i];
@@ -146,13 +147,13 @@ impl Contest<'_> {
         }
     }
 
-    fn row(&self, entry: Entry) -> Row {
+    fn row(&self, entry: BackendAtPoint) -> Row {
         let (c, d) = (&self.points[entry.point], self.rivals.present[entry.rival].describe());
         let timings = if entry.timed.is_empty() { vec![entry.warm_up] } else { entry.timed };
         let wall: Vec<f64> = timings.iter().map(|t| t.wall_ms).collect();
         let spread = Spread::of(&wall);
         let device: Option<Vec<f64>> = timings.iter().map(|t| t.device_ms).collect();
-        let Shown { errors, delta_e, files, difference } = entry.shown;
+        let JudgedPicture { errors, delta_e, files, difference } = entry.shown;
         Row {
             backend: d.backend.to_owned(),
             adapter: d.adapter.clone(),

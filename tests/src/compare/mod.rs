@@ -21,8 +21,8 @@ use crate::report::{
 pub use options::{CompareArgs, parse};
 pub use output::{OutputError, say};
 
-use contest::{Contest, Limits};
-use output::{Output, Pictures};
+use contest::{Contest, MeasureLimits};
+use output::{OutputFolder, Pictures};
 use rivals::Rivals;
 use subject::Exhibit;
 
@@ -63,7 +63,7 @@ impl CompareError {
 /// A volume, scene or folder that cannot be had, a required backend that is absent, or no measurement at all.
 pub fn compare(args: &CompareArgs) -> Result<Report, CompareError> {
     let begin = Instant::now();
-    let output = Output::new(&args.out)?;
+    let output = OutputFolder::new(&args.out)?;
     let mut rivals = Rivals::open(&args.backends, args.adapter.as_deref());
     rivals.check_required(&args.require)?;
     rivals.check_any()?;
@@ -71,12 +71,13 @@ pub fn compare(args: &CompareArgs) -> Result<Report, CompareError> {
     let points = sweep::sweep_points(args, &exhibit)?;
     let (answer, reference) = answer(args, &exhibit, &output)?;
     let pictures = Pictures { output: &output, answer: &answer, background: args.view.background.0 };
-    let limits = Limits { end: begin + time_allowed(args), n_frames: args.frames };
+    let limits = MeasureLimits { end: begin + time_allowed(args), n_frames: args.frames };
     let (rows, left_out) = Contest { points: &points, rivals: &mut rivals, pictures: &pictures, limits }.run()?;
     if let (true, Some(first)) = (rows.is_empty(), left_out.first()) {
         return Err(CompareError::Nothing { reason: first.reason.clone() });
     }
-    let found = Found { rows, left_out, reference, backends: rivals.infos, seconds: begin.elapsed().as_secs_f64() };
+    let found =
+        CompareResult { rows, left_out, reference, backends: rivals.infos, seconds: begin.elapsed().as_secs_f64() };
     let report = report(args, &exhibit, found);
     let html = page(&report, output.folder()).map_err(OutputError::Page)?;
     output.publish(&report, &html)?;
@@ -95,7 +96,7 @@ fn time_allowed(args: &CompareArgs) -> Duration {
     Duration::from_secs_f64(seconds.min(1e6))
 }
 
-struct Found {
+struct CompareResult {
     rows: Vec<Row>,
     left_out: Vec<LeftOut>,
     reference: ReferenceInfo,
@@ -104,7 +105,11 @@ struct Found {
 }
 
 /// The continuous answer, and its lines in the report.
-fn answer(args: &CompareArgs, exhibit: &Exhibit, output: &Output) -> Result<(Image<f64>, ReferenceInfo), CompareError> {
+fn answer(
+    args: &CompareArgs,
+    exhibit: &Exhibit,
+    output: &OutputFolder,
+) -> Result<(Image<f64>, ReferenceInfo), CompareError> {
     let (begin, scene) = (Instant::now(), &exhibit.scene);
     let spinner = ProgressBar::new_spinner().with_message("integrating the continuous answer");
     spinner.enable_steady_tick(Duration::from_millis(200));
@@ -124,7 +129,7 @@ fn answer(args: &CompareArgs, exhibit: &Exhibit, output: &Output) -> Result<(Ima
     Ok((answer.image, info))
 }
 
-fn report(args: &CompareArgs, exhibit: &Exhibit, found: Found) -> Report {
+fn report(args: &CompareArgs, exhibit: &Exhibit, found: CompareResult) -> Report {
     let mut rows = found.rows;
     mark_front(&mut rows);
     Report {

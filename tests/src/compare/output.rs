@@ -30,7 +30,7 @@ pub enum OutputError {
 }
 
 /// A hidden folder in the output folder, which takes everything until it is complete.
-pub(super) struct Output {
+pub(super) struct OutputFolder {
     out: PathBuf,
     draft: tempfile::TempDir,
 }
@@ -42,8 +42,8 @@ pub(super) struct Files {
     pub(super) png: String,
 }
 
-impl Output {
-    pub(super) fn new(out: &Path) -> Result<Output, OutputError> {
+impl OutputFolder {
+    pub(super) fn new(out: &Path) -> Result<OutputFolder, OutputError> {
         let io = |source| OutputError::Io { path: out.to_owned(), source };
         std::fs::create_dir_all(out).map_err(io)?;
         if out.join("images").exists() && !out.join("report.json").exists() {
@@ -54,7 +54,7 @@ impl Output {
         }
         let draft = tempfile::Builder::new().prefix(".draft").tempdir_in(out).map_err(io)?;
         std::fs::create_dir(draft.path().join("images")).map_err(io)?;
-        Ok(Output { out: out.to_owned(), draft })
+        Ok(OutputFolder { out: out.to_owned(), draft })
     }
 
     /// Where the files lie until they are published.
@@ -95,13 +95,13 @@ impl Output {
 
 /// Judges pictures by the answer, and writes them.
 pub(super) struct Pictures<'a> {
-    pub(super) output: &'a Output,
+    pub(super) output: &'a OutputFolder,
     pub(super) answer: &'a Image<f64>,
     pub(super) background: LinearRgb,
 }
 
 /// A picture that has been judged and written.
-pub(super) struct Shown {
+pub(super) struct JudgedPicture {
     pub(super) errors: Errors,
     pub(super) delta_e: ColorDifferences,
     pub(super) files: Files,
@@ -115,7 +115,7 @@ impl Pictures<'_> {
         case: &SweepPoint,
         by: &Description,
         image: &Image<f32>,
-    ) -> Result<Result<Shown, String>, OutputError> {
+    ) -> Result<Result<JudgedPicture, String>, OutputError> {
         let judged = errors(image, self.answer).and_then(|e| Ok((e, delta_e(image, self.answer, self.background)?)));
         let (errors, delta_e) = match judged {
             Ok(judged) => judged,
@@ -130,7 +130,7 @@ impl Pictures<'_> {
         ];
         let files = self.output.picture(&name, image, self.background, &attributes)?;
         let difference = self.difference(&format!("{name}-difference"), image, &attributes)?;
-        Ok(Ok(Shown { errors, delta_e, files, difference }))
+        Ok(Ok(JudgedPicture { errors, delta_e, files, difference }))
     }
 
     fn difference(&self, name: &str, image: &Image<f32>, attributes: &[(&str, String)]) -> Result<Files, OutputError> {
@@ -179,7 +179,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("a/b");
         for pixel in [0.25, 0.75] {
-            let output = Output::new(&out).unwrap();
+            let output = OutputFolder::new(&out).unwrap();
             let image = Image::new([1, 1].into(), vec![[pixel; 4]]).unwrap();
             let files = output.picture(&format!("p{pixel}"), &image, [0.0; 3], &[]).unwrap();
             assert!(!out.join(files.png).exists());
@@ -192,9 +192,9 @@ mod tests {
     #[test]
     fn what_fails_leaves_nothing_behind_and_foreign_pictures_alone() {
         let folder = tempfile::tempdir().unwrap();
-        drop(Output::new(folder.path()).unwrap());
+        drop(OutputFolder::new(folder.path()).unwrap());
         assert!(names(folder.path()).is_empty());
         std::fs::create_dir(folder.path().join("images")).unwrap();
-        assert!(matches!(Output::new(folder.path()), Err(OutputError::Foreign { .. })));
+        assert!(matches!(OutputFolder::new(folder.path()), Err(OutputError::Foreign { .. })));
     }
 }

@@ -99,14 +99,14 @@ impl Candidate {
     }
 }
 
-type Opened = Result<Box<dyn Backend>, String>;
+type OpenedBackend = Result<Box<dyn Backend>, String>;
 
 fn open_patched(
     kind: BackendKind,
     adapter: Option<&str>,
     validation: Validation,
     library: ShaderLibrary,
-) -> Option<Opened> {
+) -> Option<OpenedBackend> {
     match kind {
         BackendKind::Cpu => None,
         BackendKind::Wgpu => Some(open_wgpu(adapter, library)),
@@ -115,7 +115,7 @@ fn open_patched(
 }
 
 #[cfg(feature = "wgpu")]
-fn open_wgpu(adapter: Option<&str>, library: ShaderLibrary) -> Opened {
+fn open_wgpu(adapter: Option<&str>, library: ShaderLibrary) -> OpenedBackend {
     use brickfield_wgpu::{AdapterChoice, WgpuBackend};
     let choice = match adapter.map(|a| (a, a.parse())) {
         None => AdapterChoice::Default,
@@ -128,12 +128,12 @@ fn open_wgpu(adapter: Option<&str>, library: ShaderLibrary) -> Opened {
 }
 
 #[cfg(not(feature = "wgpu"))]
-fn open_wgpu(_: Option<&str>, _: ShaderLibrary) -> Opened {
+fn open_wgpu(_: Option<&str>, _: ShaderLibrary) -> OpenedBackend {
     Err("wgpu is not in this build".to_owned())
 }
 
 #[cfg(feature = "ash")]
-fn open_ash(adapter: Option<&str>, validation: Validation, library: ShaderLibrary) -> Opened {
+fn open_ash(adapter: Option<&str>, validation: Validation, library: ShaderLibrary) -> OpenedBackend {
     use brickfield_ash::{AdapterChoice, AshBackend, Options};
     let adapter = match adapter.map(|a| (a, a.parse())) {
         None => AdapterChoice::Default,
@@ -151,6 +151,6 @@ fn open_ash(adapter: Option<&str>, validation: Validation, library: ShaderLibrar
 }
 
 #[cfg(not(feature = "ash"))]
-fn open_ash(_: Option<&str>, _: Validation, _: ShaderLibrary) -> Opened {
+fn open_ash(_: Option<&str>, _: Validation, _: ShaderLibrary) -> OpenedBackend {
     Err("ash is not in this build".to_owned())
 }

@@ -10,6 +10,7 @@ use brickfield_core::Volume;
 
 use super::plan_mutants::PlanMutant;
 use super::shader_mutants::ShaderMutant;
+use super::storage::Storage;
 
 /// A case of the conformance run.
 pub struct Case {
@@ -58,6 +59,8 @@ pub struct PictureTest {
     pub shows: Shows,
     /// How many triangles are drawn at a time, if not as many as usual.
     pub triangles_at_a_time: Option<u32>,
+    /// How the samples are stored.
+    pub storage: Storage,
 }
 
 /// Whether a picture shows anything.
@@ -95,13 +98,13 @@ pub struct FunctionTest {
     /// The function.
     pub function: ShaderFunction,
     /// Inputs, each with its answer.
-    pub points: Vec<Point>,
+    pub points: Vec<FunctionPoint>,
 }
 
 /// An input, its answer, and how far each channel may be off.
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
-pub struct Point {
+pub struct FunctionPoint {
     pub input: [f32; 4],
     pub expected: [f64; 4],
     pub tolerance: [f64; 4],
@@ -127,7 +130,13 @@ impl PictureTest {
         if let Some(n) = self.triangles_at_a_time {
             replayed = replayed.in_batches_of(n);
         }
-        Ok(Plans { replayed, complete: prepare(&self.tree, &complete, &mut Residency::default())? })
+        let complete = prepare(&self.tree, &complete, &mut Residency::default())?;
+        let volume = match &self.oracle {
+            Oracle::Volume(volume) | Oracle::EveryLevel(volume) => Some(&**volume),
+            Oracle::None => None,
+        };
+        let stored = |plan| self.storage.of(plan, volume);
+        Ok(Plans { replayed: stored(replayed), complete: stored(complete) })
     }
 }
 

@@ -17,10 +17,10 @@ use super::rule::{Complaint, PlanTolerance, Tolerance, Verdict, bounded};
 
 /// A case that is ready to be run on any backend.
 pub struct Prepared {
-    work: Work,
+    work: CheckTask,
 }
 
-enum Work {
+enum CheckTask {
     Picture(Box<PreparedPicture>),
     Function(Box<FunctionTest>),
 }
@@ -87,7 +87,7 @@ impl Prepared {
     /// No data, a scene that is refused, a reference that is wrong.
     pub fn of(case: &Case) -> Result<Prepared, Obstacle> {
         let work = match &case.check {
-            Check::Function(test) => Work::Function(Box::new(test())),
+            Check::Function(test) => CheckTask::Function(Box::new(test())),
             Check::Picture(subject) => {
                 let subject = subject()?;
                 let plans = subject.plans()?;
@@ -96,7 +96,7 @@ impl Prepared {
                 check_oracle(&subject, &reference)?;
                 let tolerance = PlanTolerance::of(&plans.replayed, &reference);
                 let on_devices = BTreeMap::new();
-                Work::Picture(Box::new(PreparedPicture { subject, plans, reference, tolerance, on_devices }))
+                CheckTask::Picture(Box::new(PreparedPicture { subject, plans, reference, tolerance, on_devices }))
             }
         };
         Ok(Prepared { work })
@@ -105,8 +105,8 @@ impl Prepared {
     /// The reference picture, if the case has one.
     pub fn reference(&self) -> Option<&Image<f64>> {
         match &self.work {
-            Work::Picture(picture) => Some(&picture.reference.image),
-            Work::Function(_) => None,
+            CheckTask::Picture(picture) => Some(&picture.reference.image),
+            CheckTask::Function(_) => None,
         }
     }
 
@@ -115,8 +115,8 @@ impl Prepared {
     pub fn run(&mut self, on: &mut Candidate, mutant: Option<&Mutant>) -> Judged {
         let Some(capabilities) = on.capabilities() else { return Judged::Absent };
         let run = AssertUnwindSafe(|| match &mut self.work {
-            Work::Function(test) => run_function(test, on, mutant),
-            Work::Picture(picture) => run_picture(picture, &capabilities, on, mutant),
+            CheckTask::Function(test) => run_function(test, on, mutant),
+            CheckTask::Picture(picture) => run_picture(picture, &capabilities, on, mutant),
         });
         // A backend that panics fails its case, not the run.
         catch_unwind(run).unwrap_or_else(|payload| Judged::Panicked(words(payload.as_ref())))
@@ -125,12 +125,12 @@ impl Prepared {
     /// The scene in a few words.
     pub fn describe(&self) -> String {
         match &self.work {
-            Work::Picture(picture) => {
+            CheckTask::Picture(picture) => {
                 let (scene, plan) = (&picture.subject.scene, &picture.plans.replayed);
                 let (n, size) = (plan.field().slots().n_filled(), scene.size);
                 format!("{} x {} pixels, {n} bricks, {}, {}", size.x, size.y, scene.rule.name(), scene.mode.name())
             }
-            Work::Function(test) => format!("{} inputs", test.points.len()),
+            CheckTask::Function(test) => format!("{} inputs", test.points.len()),
         }
     }
 }

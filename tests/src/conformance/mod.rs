@@ -22,11 +22,12 @@ mod run;
 mod samples;
 mod self_check;
 pub mod shader_mutants;
+mod storage;
 mod surfaces;
 
 pub use ahead::for_each_prepared;
 pub use candidate::Candidate;
-pub use case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, PictureTest, Plans, Point, Shows};
+pub use case::{Case, Check, FunctionPoint, FunctionTest, Mutant, NoData, Oracle, PictureTest, Plans, Shows};
 pub use cases::all as cases;
 pub use check::{Judged, Obstacle, Prepared};
 pub use outcome::{Outcome, Status, Summary};
@@ -37,3 +38,4 @@ pub use rule::{Complaint, PlanTolerance, Tolerance, Verdict};
 pub use run::Run;
 pub use self_check::SelfCheck;
 pub use shader_mutants::ShaderMutant;
+pub use storage::Storage;

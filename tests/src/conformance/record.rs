@@ -1,6 +1,6 @@
 //! A record of all answers of a run, and the comparison of a later run with it: which pictures has a change of the code changed?
 //!
-//! The file is one gzip stream of entries. An entry is a line of JSON ([`Header`]) and the answer's bytes. The values are f32,
+//! The file is one gzip stream of entries. An entry is a line of JSON ([`AnswerHeader`]) and the answer's bytes. The values are f32,
 //! little-endian, four a pixel, x varies fastest, rows from the top. All first bytes of the values come first, then all second
 //! bytes, and so on: signs and exponents are alike, so gzip packs them well. An answer that is equal to an earlier one is an
 //! entry without bytes; its digest names the bytes.
@@ -50,7 +50,7 @@ pub struct RecordWriter {
 
 /// The line before an answer's bytes.
 #[derive(Serialize, Deserialize)]
-struct Header {
+struct AnswerHeader {
     case: String,
     backend: String,
     size: [u32; 2],
@@ -97,7 +97,7 @@ impl RecordWriter {
     pub fn write(&mut self, answer: &RecordEntry) -> Result<(), RecordError> {
         let digest = format!("{:016x}", digest(answer));
         let bytes = if self.stored.insert(digest.clone()) { planes(&answer.values) } else { Vec::new() };
-        let header = Header {
+        let header = AnswerHeader {
             case: answer.case.clone(),
             backend: answer.backend.clone(),
             size: answer.size.to_array(),
@@ -131,7 +131,8 @@ pub fn read_record(path: &Path) -> Result<Vec<RecordEntry>, RecordError> {
     let mut line = String::new();
     while input.read_line(&mut line).map_err(io)? > 0 {
         let damaged = |reason| RecordError::Damaged { path: path.to_owned(), entry: answers.len(), reason };
-        let header: Header = serde_json::from_str(&line).map_err(|_| damaged("its header is no JSON of a header"))?;
+        let header: AnswerHeader =
+            serde_json::from_str(&line).map_err(|_| damaged("its header is no JSON of a header"))?;
         let answer = entry(&header, &mut input, &stored, &answers).map_err(io)?;
         let answer = answer.ok_or_else(|| damaged("it has neither bytes for its size nor an earlier entry's"))?;
         if header.digest != format!("{:016x}", digest(&answer)) {
@@ -146,7 +147,7 @@ pub fn read_record(path: &Path) -> Result<Vec<RecordEntry>, RecordError> {
 
 /// The answer that follows a header; `None` if there are not as many bytes as its size asks for.
 fn entry(
-    header: &Header,
+    header: &AnswerHeader,
     input: &mut impl Read,
     stored: &HashMap<String, usize>,
     answers: &[RecordEntry],
@@ -158,7 +159,7 @@ fn entry(
         _ => from_planes(&bytes),
     };
     let n_pixels = header.size.iter().map(|n| *n as usize).product::<usize>();
-    let Header { case, backend, size, .. } = header;
+    let AnswerHeader { case, backend, size, .. } = header;
     let answer = RecordEntry { case: case.clone(), backend: backend.clone(), size: (*size).into(), values };
     Ok((bytes.len() == header.n_bytes && answer.values.len() == n_pixels).then_some(answer))
 }

@@ -157,6 +157,13 @@ mutants! {
     /// Rays take the least steep stack of planes.
     STACK_FLAT: "stack-flat", "rays", "stack_of", "let axis = select(select(2u, 1u, steep.y >= steep.z), 0u, steep.x >= steep.y && steep.x >= steep.z);"
         => "let axis = select(select(2u, 1u, steep.y < steep.z), 0u, steep.x < steep.y && steep.x < steep.z);";
+    /// The axes of a texture are those of space.
+    PLACED_AXES: "placed-axes", "field/placed", "value_at", "vec3f(s[area.axes.x], s[area.axes.y], s[area.axes.z])" => "s";
+    /// The first sample lies at the block's corner.
+    PLACED_FIRST: "placed-first", "field/placed", "patch_of", "area.first = place.first + frame.first_sample;"
+        => "area.first = block.corner;";
+    /// Slots are read as if they were of level 0.
+    PLACED_SCALE: "placed-scale", "field/placed", "patch_of", "area.scale = 1.0 / f32(1u << place.level);" => "area.scale = 1.0;";
     /// Opacity is the depth.
     OPACITY_IS_DEPTH: "opacity-is-depth", "march", "march", "vec4f(seen.rgb, alpha(seen.w))" => "vec4f(seen.rgb, min(seen.w, 1.0))";
 }

@@ -7,14 +7,14 @@ use brickfield_core::{BrickSide, IndexPos, Ray, Span, Volume};
 
 /// One segment of a ray.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Segment {
+pub(super) struct RaySegment {
     start: f64,
     end: f64,
     /// The length that its light is computed for, in world units.
     pub(super) length: f64,
 }
 
-impl Segment {
+impl RaySegment {
     /// The parameter at fraction `x` of the segment.
     pub(super) fn at(self, x: f64) -> f64 {
         self.start * (1.0 - x) + self.end * x
@@ -23,7 +23,7 @@ impl Segment {
 
 /// Surfaces at t = origin + k step, t in world units from the eye.
 #[derive(Clone, Copy, Debug)]
-struct Surfaces {
+struct EvenSurfaces {
     origin: f64,
     step: f64,
 }
@@ -35,7 +35,7 @@ pub(super) fn segments(
     scene: &Scene,
     (x, y): (u32, u32),
     span: Span,
-) -> Vec<Segment> {
+) -> Vec<RaySegment> {
     let nominal = scene.step_voxels * volume.grid().spacing().min_element();
     let ray = scene.camera.pixel_rays(scene.size).pixel_ray(x, y);
     let surfaces = surfaces(volume, scene, (x, y), &ray, nominal);
@@ -46,7 +46,7 @@ pub(super) fn segments(
     whole.into_iter().flat_map(|span| between(surfaces, span, scene.lengths, nominal)).collect()
 }
 
-fn surfaces(volume: &Volume, scene: &Scene, (x, y): (u32, u32), ray: &Ray, nominal: f64) -> Surfaces {
+fn surfaces(volume: &Volume, scene: &Scene, (x, y): (u32, u32), ray: &Ray, nominal: f64) -> EvenSurfaces {
     let along = |normal: DVec3| nominal / ray.direction.dot(normal);
     let step = match scene.placement {
         Placement::Shells => nominal,
@@ -54,7 +54,7 @@ fn surfaces(volume: &Volume, scene: &Scene, (x, y): (u32, u32), ray: &Ray, nomin
         Placement::TessellatedShells { facet_pixels } => along(facet(scene, x, y, facet_pixels)),
         Placement::ObjectPlanes => return object_planes(volume, ray, nominal),
     };
-    Surfaces { origin: 0.0, step }
+    EvenSurfaces { origin: 0.0, step }
 }
 
 /// The normal n of the plane n . p = 1 through the corners of a pixel's facet, in the world from the eye.
@@ -70,7 +70,7 @@ fn facet(scene: &Scene, x: u32, y: u32, side: u32) -> DVec3 {
 }
 
 /// The stack of grid planes that the ray meets at the steepest angle; ties to 1/4096 go to x before y before z.
-fn object_planes(volume: &Volume, ray: &Ray, nominal: f64) -> Surfaces {
+fn object_planes(volume: &Volume, ray: &Ray, nominal: f64) -> EvenSurfaces {
     let grid = volume.grid();
     let through = |axis: usize| {
         let (u, v) = (DVec3::AXES[(axis + 1) % 3], DVec3::AXES[(axis + 2) % 3]);
@@ -85,7 +85,7 @@ fn object_planes(volume: &Volume, ray: &Ray, nominal: f64) -> Surfaces {
     let ahead = grid.world_to_index().transform_vector3(ray.direction)[axis] > 0.0;
     let on_plane = grid.world(IndexPos(if ahead { low } else { high })).0;
     let origin = (on_plane - ray.origin).dot(through(axis)) / cosines[axis];
-    Surfaces { origin, step: nominal / cosines[axis].abs() }
+    EvenSurfaces { origin, step: nominal / cosines[axis].abs() }
 }
 
 /// The ray's ways through bricks of level 0.
@@ -103,18 +103,22 @@ fn across_bricks(volume: &Volume, side: BrickSide, ray: &Ray, span: Span) -> Vec
     cuts.windows(2).map(|w| Span { start: w[0], end: w[1] }).collect()
 }
 
-fn between(surfaces: Surfaces, span: Span, lengths: Lengths, nominal: f64) -> Vec<Segment> {
-    let Surfaces { origin, step } = surfaces;
+fn between(surfaces: EvenSurfaces, span: Span, lengths: Lengths, nominal: f64) -> Vec<RaySegment> {
+    let EvenSurfaces { origin, step } = surfaces;
     let (first, last) = (((span.start - origin) / step).floor(), ((span.end - origin) / step).ceil());
     let uncut = (0..(last - first) as u64).map(|i| origin + (first + i as f64) * step);
     let segments = uncut.filter_map(|start| match lengths {
         Lengths::True => {
             let (start, end) = (start.max(span.start), (start + step).min(span.end));
-            (start < end).then_some(Segment { start, end, length: end - start })
+            (start < end).then_some(RaySegment { start, end, length: end - start })
         }
         Lengths::Nominal => {
             let middle = start + 0.5 * step;
-            (span.start <= middle && middle < span.end).then_some(Segment { start, end: start + step, length: nominal })
+            (span.start <= middle && middle < span.end).then_some(RaySegment {
+                start,
+                end: start + step,
+                length: nominal,
+            })
         }
     });
     segments.collect()

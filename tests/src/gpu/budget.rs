@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// A measurement that was asked for and not made.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[allow(missing_docs)]
-pub struct LeftOut {
+pub struct Unmeasured {
     pub what: String,
     pub reason: String,
 }
@@ -23,9 +23,9 @@ pub(super) struct Budget {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Deadline(Instant);
 
-impl LeftOut {
-    pub(super) fn new(what: impl Into<String>, reason: impl Into<String>) -> LeftOut {
-        LeftOut { what: what.into(), reason: reason.into() }
+impl Unmeasured {
+    pub(super) fn new(what: impl Into<String>, reason: impl Into<String>) -> Unmeasured {
+        Unmeasured { what: what.into(), reason: reason.into() }
     }
 }
 
@@ -58,12 +58,12 @@ impl Deadline {
     }
 
     /// Whether something that takes about so many seconds may begin.
-    pub(super) fn admit(self, what: &str, seconds: f64) -> Result<(), LeftOut> {
+    pub(super) fn admit(self, what: &str, seconds: f64) -> Result<(), Unmeasured> {
         let left = self.seconds_left();
         match left > seconds {
             true => Ok(()),
-            false if seconds == 0.0 => Err(LeftOut::new(what, "no time was left: allow more --seconds")),
-            false => Err(LeftOut::new(
+            false if seconds == 0.0 => Err(Unmeasured::new(what, "no time was left: allow more --seconds")),
+            false => Err(Unmeasured::new(
                 what,
                 format!("it would take about {seconds:.1} s, {left:.1} s were left: allow more --seconds"),
             )),

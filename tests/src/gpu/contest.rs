@@ -12,10 +12,10 @@ use brickfield::{BackendKind, Scene, Skipping, Validation, Viewpoint, open_backe
 use brickfield_core::glam::UVec2;
 use brickfield_core::{BrickSide, ScalarType, TransferFunction, Volume};
 
-use super::budget::{Deadline, LeftOut};
+use super::budget::{Deadline, Unmeasured};
 use super::phantoms::Phantoms;
 use super::report::Times;
-use super::{Form, Found};
+use super::{Form, PartResult};
 use crate::turns::{Contestant, Spread, Turn, order};
 use crate::volumes::{phantom_camera, phantom_transfer};
 
@@ -42,10 +42,10 @@ struct Entrant<'a> {
 type Backends = Vec<(BackendKind, Box<dyn Backend>)>;
 
 impl Entrant<'_> {
-    fn take(&mut self, turn: Turn, backends: &mut Backends) -> Result<f64, LeftOut> {
+    fn take(&mut self, turn: Turn, backends: &mut Backends) -> Result<f64, Unmeasured> {
         let (kind, backend) = &mut backends[self.backend];
         let frame = self.contestant.take(turn, backend.as_mut());
-        frame.map(|frame| frame.ms).map_err(|e| LeftOut::new(format!("{}, {kind}", self.what), e.to_string()))
+        frame.map(|frame| frame.ms).map_err(|e| Unmeasured::new(format!("{}, {kind}", self.what), e.to_string()))
     }
 }
 
@@ -56,7 +56,7 @@ pub(super) fn contest(
     data: Option<&Path>,
     phantoms: &mut Phantoms,
     deadline: Deadline,
-) -> Found<(Vec<Times>, Option<f64>)> {
+) -> PartResult<(Vec<Times>, Option<f64>)> {
     let mut left_out = Vec::new();
     let octree = octree(form, phantoms, deadline).map_err(|e| left_out.push(e)).ok();
     let mut backends = backends(adapter, &mut left_out);
@@ -67,28 +67,28 @@ pub(super) fn contest(
         times.extend(of_exhibit(exhibit, &mut backends, (deadline, share), &mut left_out));
     }
     let line = format!("{} contestants, octree {:.0} M voxels/s", times.len(), octree.unwrap_or(f64::NAN));
-    Found { found: (times, octree), left_out, line }
+    PartResult { found: (times, octree), left_out, line }
 }
 
-fn backends(adapter: Option<&str>, left_out: &mut Vec<LeftOut>) -> Backends {
+fn backends(adapter: Option<&str>, left_out: &mut Vec<Unmeasured>) -> Backends {
     let mut backends = Backends::new();
     for kind in BackendKind::ALL {
         let adapter = adapter.filter(|_| kind != BackendKind::Cpu);
         match open_backend(kind, adapter, Validation::Off) {
             Ok(backend) => backends.push((kind, backend)),
-            Err(e) => left_out.push(LeftOut::new(format!("contestants on {kind}"), e.to_string())),
+            Err(e) => left_out.push(Unmeasured::new(format!("contestants on {kind}"), e.to_string())),
         }
     }
     backends
 }
 
-fn exhibits(form: Form, data: Option<&Path>, phantoms: &mut Phantoms, left_out: &mut Vec<LeftOut>) -> Vec<Exhibit> {
+fn exhibits(form: Form, data: Option<&Path>, phantoms: &mut Phantoms, left_out: &mut Vec<Unmeasured>) -> Vec<Exhibit> {
     let (voxels, pixels) = form.sizes().contest;
     let size = UVec2::splat(pixels);
     let mut exhibits = Vec::new();
     let mut add = |name: &str, made: Result<Exhibit, String>| match made {
         Ok(exhibit) => exhibits.push(exhibit),
-        Err(reason) => left_out.push(LeftOut::new(format!("contestants of {name}"), reason)),
+        Err(reason) => left_out.push(Unmeasured::new(format!("contestants of {name}"), reason)),
     };
     add("the phantom", phantom(voxels, phantoms, size));
     for (name, path) in REAL {
@@ -123,7 +123,7 @@ fn of_exhibit(
     exhibit: &Exhibit,
     backends: &mut Backends,
     (deadline, share): (Deadline, f64),
-    left_out: &mut Vec<LeftOut>,
+    left_out: &mut Vec<Unmeasured>,
 ) -> Vec<Times> {
     let mut trees = Vec::new();
     // 32 first: if time runs out, its scenes have had their turns.
@@ -131,7 +131,7 @@ fn of_exhibit(
         let options = BuildOptions { side, downsampling: Downsampling::Average, max_bytes: None };
         match build_tree(&exhibit.volume, &options) {
             Ok(tree) => trees.push((side, tree)),
-            Err(e) => left_out.push(LeftOut::new(format!("{} in bricks of {side}", exhibit.name), e.to_string())),
+            Err(e) => left_out.push(Unmeasured::new(format!("{} in bricks of {side}", exhibit.name), e.to_string())),
         }
     }
     let mut entrants = Vec::new();
@@ -170,7 +170,7 @@ fn in_turns(
     mut entrants: Vec<Entrant<'_>>,
     backends: &mut Backends,
     (deadline, share): (Deadline, f64),
-    left_out: &mut Vec<LeftOut>,
+    left_out: &mut Vec<Unmeasured>,
 ) -> Vec<Times> {
     let (begin, third) = (Instant::now(), deadline.share(1.0 / 3.0));
     entrants.retain_mut(|entrant| {
@@ -201,10 +201,10 @@ fn in_turns(
 }
 
 /// The octree of a large volume, in millions of voxels a second.
-fn octree(form: Form, phantoms: &mut Phantoms, deadline: Deadline) -> Result<f64, LeftOut> {
+fn octree(form: Form, phantoms: &mut Phantoms, deadline: Deadline) -> Result<f64, Unmeasured> {
     deadline.admit("the octree's build", 0.0)?;
     let volume = phantoms.of(form.sizes().octree);
     let begin = Instant::now();
-    super::errors::tree(&volume).map_err(|e| LeftOut::new("the octree's build", e))?;
+    super::errors::tree(&volume).map_err(|e| Unmeasured::new("the octree's build", e))?;
     Ok(volume.grid().n_voxels() as f64 * 1e-6 / begin.elapsed().as_secs_f64())
 }

@@ -9,10 +9,10 @@ use brickfield::{Residency, Scene, Skipping, prepare};
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickSide, Grid, Knot, ScalarType, Volume};
 
-use super::budget::{Deadline, LeftOut};
+use super::budget::{Deadline, Unmeasured};
 use super::devices::Devices;
 use super::report::{FilterBits, ModeError};
-use super::{Form, Found};
+use super::{Form, PartResult};
 use crate::conformance::Tolerance;
 use crate::volumes::{Phantom, fill_unit, phantom_of, spread};
 
@@ -29,7 +29,7 @@ pub(super) fn errors(
     devices: &mut Devices,
     deadline: Deadline,
     failures: &mut Vec<String>,
-) -> Found<Vec<ModeError>> {
+) -> PartResult<Vec<ModeError>> {
     let (voxels, pixels) = form.sizes().errors;
     let (mut found, mut left_out) = (Vec::new(), Vec::new());
     for scalar in SCALARS {
@@ -38,7 +38,7 @@ pub(super) fn errors(
             continue;
         }
         match subject(scalar, voxels, pixels) {
-            Err(reason) => left_out.push(LeftOut::new(scalar.name(), reason)),
+            Err(reason) => left_out.push(Unmeasured::new(scalar.name(), reason)),
             Ok(subject) => subject.measure(devices, &mut found, &mut left_out),
         }
     }
@@ -47,24 +47,24 @@ pub(super) fn errors(
     }));
     let worst = found.iter().map(|e| e.of_bound).fold(0.0, f64::max);
     let line = format!("{} pictures, at most {worst:.2} of what the rule allows", found.len());
-    Found { found, left_out, line }
+    PartResult { found, left_out, line }
 }
 
 /// The phantom in one format.
-struct Subject {
+struct PhantomInFormat {
     scalar: ScalarType,
     tree: BrickTree,
     scene: Scene,
     reference: Discrete,
 }
 
-fn subject(scalar: ScalarType, voxels: u32, pixels: u32) -> Result<Subject, String> {
+fn subject(scalar: ScalarType, voxels: u32, pixels: u32) -> Result<PhantomInFormat, String> {
     let Phantom { volume, transfer, camera } = phantom_of(UVec3::splat(voxels), scalar);
     let tree = tree(&volume)?;
     let scene = Scene::new(camera, UVec2::splat(pixels), transfer);
     let complete = Scene { skipping: Skipping::Off, ..scene.clone() };
     let plan = prepare(&tree, &complete, &mut Residency::default()).map_err(|e| e.to_string())?;
-    Ok(Subject { scalar, tree, scene, reference: discrete(&plan) })
+    Ok(PhantomInFormat { scalar, tree, scene, reference: discrete(&plan) })
 }
 
 /// An octree of bricks of 32.
@@ -73,13 +73,13 @@ pub(super) fn tree(volume: &Volume) -> Result<BrickTree, String> {
     build_tree(volume, &options).map_err(|e| e.to_string())
 }
 
-impl Subject {
-    fn measure(&self, devices: &mut Devices, found: &mut Vec<ModeError>, left_out: &mut Vec<LeftOut>) {
+impl PhantomInFormat {
+    fn measure(&self, devices: &mut Devices, found: &mut Vec<ModeError>, left_out: &mut Vec<Unmeasured>) {
         for (name, mode) in MODES {
             for (kind, probe) in devices.iter_mut() {
                 match self.error(name, mode, &mut **probe) {
                     Ok(error) => found.push(error),
-                    Err(e) => left_out.push(LeftOut::new(format!("{kind}, {}, {name}", self.scalar.name()), e)),
+                    Err(e) => left_out.push(Unmeasured::new(format!("{kind}, {}, {name}", self.scalar.name()), e)),
                 }
             }
         }
@@ -110,19 +110,19 @@ impl Subject {
 const N_POSITIONS: u32 = 4096;
 
 /// Measures how many steps the device's filter takes from one sample to the next.
-pub(super) fn filters(devices: &mut Devices) -> Found<Vec<FilterBits>> {
+pub(super) fn filters(devices: &mut Devices) -> PartResult<Vec<FilterBits>> {
     let (mut found, mut left_out) = (Vec::new(), Vec::new());
     for scalar in SCALARS {
         for (kind, probe) in devices.iter_mut() {
             match filter_bits(scalar, &mut **probe) {
                 Ok(bits) => found.push(bits),
-                Err(e) => left_out.push(LeftOut::new(format!("{kind}, filter of {}", scalar.name()), e)),
+                Err(e) => left_out.push(Unmeasured::new(format!("{kind}, filter of {}", scalar.name()), e)),
             }
         }
     }
     let bits: Vec<String> =
         found.iter().map(|b: &FilterBits| format!("{} {} {:.1}", b.backend, b.scalar, b.measured)).collect();
-    Found { found, left_out, line: format!("bits of a weight: {}", bits.join(", ")) }
+    PartResult { found, left_out, line: format!("bits of a weight: {}", bits.join(", ")) }
 }
 
 fn filter_bits(scalar: ScalarType, backend: &mut dyn Backend) -> Result<FilterBits, String> {

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use brickfield::Validation;
 
-use super::budget::{Deadline, LeftOut};
+use super::budget::{Deadline, Unmeasured};
 use super::devices::KINDS;
-use super::report::{Conformance, Counts};
-use super::{Form, Found};
+use super::report::{CaseCounts, Conformance};
+use super::{Form, PartResult};
 use crate::conformance::{Candidate, Outcome, Prepared, Run, Status, Summary, cases};
 
 /// Parts of the names of the short form's cases.
@@ -33,7 +33,7 @@ pub(super) fn hold(
     pictures: &Path,
     deadline: Deadline,
     failures: &mut Vec<String>,
-) -> Found<Conformance> {
+) -> PartResult<Conformance> {
     let mut cases = cases();
     let n_cases = cases.len();
     if form == Form::Short {
@@ -53,7 +53,7 @@ pub(super) fn hold(
     let conformance = Conformance { n_cases, n_cases_run, counts: counts(&outcomes) };
     let left_out = left_out(form, &conformance, cases.len(), &outcomes);
     let line = format!("{n_cases_run} of {n_cases} cases, {}", Summary::of(&outcomes));
-    Found { found: conformance, left_out, line }
+    PartResult { found: conformance, left_out, line }
 }
 
 /// 0 to `n`, every [`STRIDE`]th first.
@@ -61,7 +61,7 @@ fn in_strides(n: usize) -> impl Iterator<Item = usize> {
     (0..STRIDE).flat_map(move |first| (first..n).step_by(STRIDE))
 }
 
-fn counts(outcomes: &[Outcome]) -> Vec<Counts> {
+fn counts(outcomes: &[Outcome]) -> Vec<CaseCounts> {
     let mut by_backend: BTreeMap<&str, Vec<&Outcome>> = BTreeMap::new();
     for outcome in outcomes {
         let (backend, _) = outcome.backend.split_once('@').unwrap_or((&outcome.backend, ""));
@@ -69,28 +69,29 @@ fn counts(outcomes: &[Outcome]) -> Vec<Counts> {
     }
     let counted = |(backend, outcomes): (&str, Vec<&Outcome>)| {
         let Summary { passed, failed, skipped } = Summary::of(outcomes);
-        Counts { backend: backend.to_owned(), passed, failed, skipped }
+        CaseCounts { backend: backend.to_owned(), passed, failed, skipped }
     };
     by_backend.into_iter().map(counted).collect()
 }
 
-fn left_out(form: Form, conformance: &Conformance, n_wanted: usize, outcomes: &[Outcome]) -> Vec<LeftOut> {
+fn left_out(form: Form, conformance: &Conformance, n_wanted: usize, outcomes: &[Outcome]) -> Vec<Unmeasured> {
     let mut left_out = Vec::new();
     let Conformance { n_cases, n_cases_run, .. } = *conformance;
     if n_wanted < n_cases {
         let reason = format!("the {} form runs {n_wanted}", form.name());
-        left_out.push(LeftOut::new(format!("{} cases", n_cases - n_wanted), reason));
+        left_out.push(Unmeasured::new(format!("{} cases", n_cases - n_wanted), reason));
     }
     if n_cases_run < n_wanted {
         let what = format!("{} cases", n_wanted - n_cases_run);
-        left_out.push(LeftOut::new(what, "no time was left: allow more --seconds"));
+        left_out.push(Unmeasured::new(what, "no time was left: allow more --seconds"));
     }
     let mut reasons: BTreeMap<(&str, &str), usize> = BTreeMap::new();
     for o in outcomes.iter().filter(|o| !matches!(o.status, Status::Pass | Status::Fail)) {
         *reasons.entry((o.status.name(), &o.note)).or_default() += 1;
     }
-    left_out
-        .extend(reasons.into_iter().map(|((status, note), n)| LeftOut::new(format!("{n} outcomes ({status})"), note)));
+    left_out.extend(
+        reasons.into_iter().map(|((status, note), n)| Unmeasured::new(format!("{n} outcomes ({status})"), note)),
+    );
     left_out
 }
 

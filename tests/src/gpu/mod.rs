@@ -25,10 +25,10 @@ use std::time::Instant;
 use budget::{Budget, Deadline};
 use phantoms::Phantoms;
 
-pub use budget::LeftOut;
+pub use budget::Unmeasured;
 pub use devices::DeviceInfo;
 pub use report::{
-    Conformance, Counts, FilterBits, GPU_FORMAT, GpuReport, ModeError, Part, Steady, TextureRate, Times, Versions,
+    CaseCounts, Conformance, FilterBits, GPU_FORMAT, GpuReport, ModeError, Part, Steady, TextureRate, Times, Versions,
     VolumeInfo,
 };
 pub use table::table;
@@ -111,9 +111,9 @@ impl Form {
 }
 
 /// The results of a part, the measurements that it left out, and a line for each of these.
-struct Found<T> {
+struct PartResult<T> {
     found: T,
-    left_out: Vec<LeftOut>,
+    left_out: Vec<Unmeasured>,
     line: String,
 }
 
@@ -175,9 +175,9 @@ struct Parts<'a> {
 }
 
 impl Parts<'_> {
-    fn run<T>(&mut self, name: &str, share: f64, part: impl FnOnce(Deadline) -> Found<T>) -> T {
+    fn run<T>(&mut self, name: &str, share: f64, part: impl FnOnce(Deadline) -> PartResult<T>) -> T {
         let begin = Instant::now();
-        let Found { found, left_out, line } = part(self.budget.until(share));
+        let PartResult { found, left_out, line } = part(self.budget.until(share));
         let seconds = begin.elapsed().as_secs_f64();
         let without = if left_out.is_empty() { String::new() } else { format!("; {} left out", left_out.len()) };
         (self.say)(&format!("{name}: {line}{without} ({seconds:.1} s)"));
@@ -206,7 +206,7 @@ mod tests {
         let mut parts = Parts { budget: Budget::new(100.0), done: Vec::new(), say: &mut say };
         let found = parts.run("a part", 0.5, |deadline| {
             assert!(deadline.seconds_left() > 49.0);
-            Found { found: 7, left_out: vec![LeftOut::new("a frame", "no time")], line: "three frames".into() }
+            PartResult { found: 7, left_out: vec![Unmeasured::new("a frame", "no time")], line: "three frames".into() }
         });
         let Parts { done, .. } = parts;
         assert_eq!((found, done[0].name.as_str(), done[0].left_out[0].reason.as_str()), (7, "a part", "no time"));

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::budget::LeftOut;
+use super::budget::Unmeasured;
 use super::devices::DeviceInfo;
 use crate::report::Machine;
 use crate::turns::Spread;
@@ -71,7 +71,7 @@ pub struct Versions {
 pub struct Part {
     pub name: String,
     pub seconds: f64,
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<Unmeasured>,
 }
 
 /// The outcome of conformance.
@@ -81,13 +81,13 @@ pub struct Conformance {
     pub n_cases: usize,
     pub n_cases_run: usize,
     /// For each backend, and for the pair of both, which must be equal to the bit.
-    pub counts: Vec<Counts>,
+    pub counts: Vec<CaseCounts>,
 }
 
 /// Outcomes of one backend, or of the pair (`wgpu=ash`).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[allow(missing_docs)]
-pub struct Counts {
+pub struct CaseCounts {
     pub backend: String,
     pub passed: usize,
     pub failed: usize,

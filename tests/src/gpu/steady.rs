@@ -8,14 +8,14 @@ use brickfield::{Residency, Scene, Skipping, prepare};
 use brickfield_core::glam::{UVec2, UVec3};
 use brickfield_core::{BrickLayout, BrickSide, Camera, Level, Ray, ScalarType};
 
-use super::budget::{Deadline, LeftOut};
+use super::budget::{Deadline, Unmeasured};
 use super::devices::Devices;
 use super::errors::{MODES, tree};
 use super::memory::{available, gigabytes, peak};
 use super::phantoms::Phantoms;
 use super::report::{Steady, TextureRate, VolumeInfo};
 use super::texture::{Reading, texture_rate};
-use super::{Form, Found};
+use super::{Form, PartResult};
 use crate::turns::{Spread, order};
 use crate::volumes::{phantom_camera, phantom_transfer};
 
@@ -37,7 +37,7 @@ pub(super) fn steady(
     phantoms: &mut Phantoms,
     deadline: Deadline,
     failures: &mut Vec<String>,
-) -> Found<SteadyFrames> {
+) -> PartResult<SteadyFrames> {
     let sizes = form.sizes().steady;
     let (mut found, mut left_out) = (SteadyFrames::default(), Vec::new());
     // Seconds for a volume and its tree, by the one before.
@@ -49,7 +49,7 @@ pub(super) fn steady(
         let made = deadline
             .admit(&what, seconds)
             .and_then(|()| check_memory(*voxels, &what))
-            .and_then(|()| volume(*voxels, phantoms).map_err(|e| LeftOut::new(&what, e)));
+            .and_then(|()| volume(*voxels, phantoms).map_err(|e| Unmeasured::new(&what, e)));
         match made {
             Err(e) => left_out.push(e),
             Ok(mut made) => {
@@ -64,7 +64,7 @@ pub(super) fn steady(
     }
     compare_with_textures(&mut found);
     let line = line(&found);
-    Found { found, left_out, line }
+    PartResult { found, left_out, line }
 }
 
 /// A volume as a tree.
@@ -83,12 +83,12 @@ fn needed_bytes(voxels: u32) -> u64 {
     u64::from(voxels).pow(3) + memory.total.bytes() + 3 * finest
 }
 
-fn check_memory(voxels: u32, what: &str) -> Result<(), LeftOut> {
+fn check_memory(voxels: u32, what: &str) -> Result<(), Unmeasured> {
     let needed = needed_bytes(voxels);
     match available() {
         Some(available) if available < needed => {
             let (needed, available) = (gigabytes(needed), gigabytes(available));
-            Err(LeftOut::new(what, format!("it needs about {needed} of main memory, {available} are free")))
+            Err(Unmeasured::new(what, format!("it needs about {needed} of main memory, {available} are free")))
         }
         _ => Ok(()),
     }
@@ -124,7 +124,7 @@ struct Measured<'a> {
     /// Until then there may be rounds.
     rounds: Deadline,
     failures: &'a mut Vec<String>,
-    left_out: &'a mut Vec<LeftOut>,
+    left_out: &'a mut Vec<Unmeasured>,
     found: &'a mut SteadyFrames,
 }
 
@@ -148,7 +148,7 @@ impl Measured<'_> {
                 let s = &mut series[i];
                 match frame(made, &s.scene, &mut *devices[s.device].1, &mut residency) {
                     Ok((times, _)) => s.timed.push(times),
-                    Err(e) => self.left_out.push(LeftOut::new(format!("a frame, {}", s.name), e)),
+                    Err(e) => self.left_out.push(Unmeasured::new(format!("a frame, {}", s.name), e)),
                 }
             }
         }
@@ -173,7 +173,7 @@ impl Measured<'_> {
                 let drawn = self
                     .deadline
                     .admit(&what, 0.0)
-                    .and_then(|()| frame(made, &scene, &mut **probe, residency).map_err(|e| LeftOut::new(&what, e)));
+                    .and_then(|()| frame(made, &scene, &mut **probe, residency).map_err(|e| Unmeasured::new(&what, e)));
                 let (times, plan) = match drawn {
                     Ok(drawn) => drawn,
                     Err(e) => {

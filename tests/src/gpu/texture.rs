@@ -3,7 +3,7 @@
 use brickfield::frame::{Fetch, Probe, SampleFormat, TextureWork};
 use brickfield_core::glam::{UVec2, UVec3};
 
-use super::budget::{Deadline, LeftOut};
+use super::budget::{Deadline, Unmeasured};
 use super::report::TextureRate;
 use crate::metrics::median;
 use crate::turns::Spread;
@@ -44,13 +44,14 @@ pub(super) fn texture_rate(
     reading: &Reading,
     deadline: Deadline,
     failures: &mut Vec<String>,
-) -> Result<TextureRate, LeftOut> {
+) -> Result<TextureRate, Unmeasured> {
     let backend = probe.describe().backend;
     let what = reading.name(backend);
     deadline.admit(&what, 0.0)?;
     let few = reading.rays.clamp(1, 64);
-    let mut read =
-        |work: &TextureWork, n_runs| probe.texture_reads(work, n_runs).map_err(|e| LeftOut::new(&what, e.to_string()));
+    let mut read = |work: &TextureWork, n_runs| {
+        probe.texture_reads(work, n_runs).map_err(|e| Unmeasured::new(&what, e.to_string()))
+    };
     let seconds_few = 1e-3 * median(read(&reading.work(few), 1)?.wall_ms);
     let rays = rays_for(seconds_few, few, reading.rays);
     let work = reading.work(rays);

@@ -11,7 +11,7 @@ use super::scenes::{geometries, rasterises, scene, tree};
 use super::{LamarArgs, LamarError, Missed, print};
 use crate::compare::rivals::Rivals;
 use crate::metrics::errors;
-use crate::orders::Row;
+use crate::orders::OrderRow;
 use crate::volumes::phantom;
 
 /// Facets' sides, in pixels: the coarsest are a sixth of the picture.
@@ -44,7 +44,7 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
             found.push((f64::from(facet_pixels), errors(&image, &answer)?.rmse));
         }
         let words: Vec<String> = found.iter().map(|(side, e)| format!("{side}: {e:.2e}")).collect();
-        let row = Row { what: name.to_owned(), order: 2.0, errors: found, floor: FLOOR, n_halvings: 5 };
+        let row = OrderRow { what: name.to_owned(), order: 2.0, errors: found, floor: FLOOR, n_halvings: 5 };
         let observed = match row.observed() {
             Some(o) => format!("order {:.2} over {} halvings", o.slope, o.n_halvings),
             None => "no order".to_owned(),

@@ -15,7 +15,7 @@ use crate::turns::{Bound, Claim, Claims, Ratio, Spread, Standing};
 
 /// A line of the table: one data set, view, tile size, geometry and backend.
 #[derive(Clone, Debug, Serialize)]
-struct Row {
+struct TableRow {
     data: String,
     dims: [u32; 3],
     view: &'static str,
@@ -85,7 +85,7 @@ const HEADER: &str = "\
 data               view     side  tiles: fixed multi  geometry        backend  fixed ms (min to max)      multi ms (min to max)      fixed / multi              multi is   \
 RMSE: fixed    multi  max: fixed    multi  as the cut says";
 
-fn of_seat(args: &LamarArgs, rivals: &mut Rivals, seat: &Seat<'_>) -> Result<Vec<Row>, LamarError> {
+fn of_seat(args: &LamarArgs, rivals: &mut Rivals, seat: &Seat<'_>) -> Result<Vec<TableRow>, LamarError> {
     let mut rows = Vec::new();
     for geometry in geometries(args) {
         let with = |detail: &[Criterion]| scene(args, &seat.data_set.transfer, seat.camera, geometry, detail);
@@ -110,14 +110,14 @@ fn contest(
     seat: &Seat<'_>,
     geometry: Geometry,
     (scenes, judges): (&[Scene; 2], &[Judge; 2]),
-) -> Result<Row, LamarError> {
+) -> Result<TableRow, LamarError> {
     let duel = duel(seat.tree, scenes, backend, args.frames)?;
     let tiling = |times: SceneTimes, judge: &Judge| -> Result<Tiling, LamarError> {
         let (error, complaint) = (distance(&times.image, seat.answer)?, judge.complaint(&times.image));
         let SceneTimes { drawn, ms, prepare_ms, .. } = times;
         Ok(Tiling { drawn, ms, prepare_ms, error, complaint })
     };
-    Ok(Row {
+    Ok(TableRow {
         data: seat.data_set.name.clone(),
         dims: seat.data_set.volume.grid().dims().to_array(),
         view: seat.view,
@@ -130,7 +130,7 @@ fn contest(
     })
 }
 
-fn line(row: &Row) -> String {
+fn line(row: &TableRow) -> String {
     let ms = |s: &Spread| format!("{:>7.1} ({:.1} to {:.1})", s.median, s.min, s.max);
     let verdict = |c: &Tiling| c.complaint.as_deref().unwrap_or("ok").to_owned();
     format!(
@@ -165,18 +165,18 @@ fn words(ratio: &Ratio) -> &'static str {
 }
 
 /// The paper's claim: from near, multiresolution is faster. Where both draw the same bricks, there is nothing to gain.
-fn claims(rows: &[Row]) -> Vec<Claim> {
+fn claims(rows: &[TableRow]) -> Vec<Claim> {
     let near = rows.iter().filter(|row| row.view != "outside" && row.fixed.drawn != row.multiresolution.drawn);
-    let claim = |row: &Row| Claim::of_ratio(format!("{}: fixed / multi", name(row)), row.ratio, Bound::Above(1.0));
+    let claim = |row: &TableRow| Claim::of_ratio(format!("{}: fixed / multi", name(row)), row.ratio, Bound::Above(1.0));
     near.map(claim).collect()
 }
 
-fn name(row: &Row) -> String {
+fn name(row: &TableRow) -> String {
     format!("{}, {}, {}^3, {}, {}", row.data, row.view, row.side, row.geometry, row.backend)
 }
 
 /// The claims that do not hold: about times, about bricks, about pictures.
-fn missed(rows: &[Row], claims: &[Claim]) -> Vec<Missed> {
+fn missed(rows: &[TableRow], claims: &[Claim]) -> Vec<Missed> {
     let of_times = claims.iter().filter_map(Missed::of_claim);
     let alike = rows.iter().filter(|row| row.view != "outside" && row.fixed.drawn == row.multiresolution.drawn);
     let alike =

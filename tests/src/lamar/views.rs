@@ -16,7 +16,7 @@ use crate::turns::{Bound, Claim, Claims, Ratio, Spread};
 use crate::volumes::{Phantom, phantom_of};
 
 #[derive(Clone, Debug, Serialize)]
-struct Row {
+struct ViewRow {
     view: u32,
     backend: &'static str,
     full: (Drawn, Spread),
@@ -75,10 +75,10 @@ fn of_view(
     tree: &BrickTree,
     view: u32,
     (scenes, judge): (&[Scene; 2], &Judge),
-) -> Result<Row, LamarError> {
+) -> Result<ViewRow, LamarError> {
     let duel = duel(tree, scenes, backend, args.frames)?;
     let (full, pixel) = (duel.first, duel.second);
-    Ok(Row {
+    Ok(ViewRow {
         view,
         backend: backend.describe().backend,
         full: (full.drawn, full.ms),
@@ -89,7 +89,7 @@ fn of_view(
     })
 }
 
-fn line(row: &Row) -> String {
+fn line(row: &ViewRow) -> String {
     let ((full, full_ms), (pixel, pixel_ms)) = (row.full, row.pixel);
     let megabytes = |d: Drawn| d.n_bytes as f64 / 1e6;
     format!(
@@ -112,8 +112,8 @@ fn line(row: &Row) -> String {
 
 /// Medians over the views, and the claims that do not hold. The claim about times is about the median over views: no
 /// row is decided by itself.
-fn summary(args: &LamarArgs, rows: &[Row]) -> Result<Vec<Missed>, LamarError> {
-    let more = |r: &&Row| r.pixel.0.n_bricks > r.full.0.n_bricks;
+fn summary(args: &LamarArgs, rows: &[ViewRow]) -> Result<Vec<Missed>, LamarError> {
+    let more = |r: &&ViewRow| r.pixel.0.n_bricks > r.full.0.n_bricks;
     let more = rows
         .iter()
         .filter(more)
@@ -127,7 +127,7 @@ fn summary(args: &LamarArgs, rows: &[Row]) -> Result<Vec<Missed>, LamarError> {
     names.dedup();
     for name in names {
         let own = || rows.iter().filter(|r| r.backend == name);
-        let over_views = |f: &dyn Fn(&Row) -> f64| crate::metrics::median(own().map(f).collect());
+        let over_views = |f: &dyn Fn(&ViewRow) -> f64| crate::metrics::median(own().map(f).collect());
         let bricks = over_views(&|r| r.pixel.0.n_bricks as f64 / r.full.0.n_bricks.max(1) as f64);
         let time = Ratio::of_rounds(own().map(|r| r.ratio.median).collect());
         let worst = own().map(|r| r.error.max).fold(0.0, f64::max);

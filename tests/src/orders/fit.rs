@@ -2,7 +2,7 @@
 
 /// One row of the table: a claim, and the observation.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct OrderRow {
     /// The refined quantity, and the rule or renderer.
     pub what: String,
     /// The claimed order.
@@ -25,7 +25,7 @@ pub struct Observed {
     pub n_halvings: usize,
 }
 
-impl Row {
+impl OrderRow {
     /// The observed order; `None` if too few errors stand above the floor.
     pub fn observed(&self) -> Option<Observed> {
         let above: Vec<(f64, f64)> = self.errors.iter().copied().take_while(|(_, e)| *e > self.floor).collect();
@@ -60,9 +60,9 @@ fn fit(errors: &[(f64, f64)]) -> f64 {
 mod tests {
     use super::*;
 
-    fn row(error: impl Fn(f64) -> f64) -> Row {
+    fn row(error: impl Fn(f64) -> f64) -> OrderRow {
         let errors = (0..7).map(|k| (0.5f64.powi(k), error(0.5f64.powi(k)))).collect();
-        Row { what: String::new(), order: 2.0, errors, floor: 0.0, n_halvings: 5 }
+        OrderRow { what: String::new(), order: 2.0, errors, floor: 0.0, n_halvings: 5 }
     }
 
     #[test]
@@ -77,8 +77,8 @@ mod tests {
         assert!(!row(|h| h.powi(2) + 1e-2).holds());
         assert!(!row(|_| 0.0).holds());
         assert!(!row(|h| f64::NAN * h).holds());
-        assert!(!Row { floor: 0.1, ..row(|h| h.powi(2)) }.holds());
-        let floor = |e: f64| Row { floor: 1e-6, n_halvings: 0, ..row(|_| e) };
+        assert!(!OrderRow { floor: 0.1, ..row(|h| h.powi(2)) }.holds());
+        let floor = |e: f64| OrderRow { floor: 1e-6, n_halvings: 0, ..row(|_| e) };
         assert!(floor(1e-7).holds() && !floor(1e-5).holds() && !floor(f64::NAN).holds());
     }
 }

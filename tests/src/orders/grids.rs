@@ -7,17 +7,17 @@ use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickSide, Camera, Grid, Knot, ScalarType, TransferFunction};
 use brickfield_optics::QuadratureRule;
 
-use super::fit::Row;
-use crate::volumes::{Field, fill};
+use super::fit::OrderRow;
+use crate::volumes::{FieldFormula, fill};
 
 /// Side of the volume in world units; the ball's sigma is 1/14 of it, so that nothing of it is lost at the faces.
 const SIDE: f64 = 14.0;
 const EXTINCTION: f64 = 0.7;
 
 /// Five halvings of the voxel.
-pub fn grid_refinement() -> Row {
+pub fn grid_refinement() -> OrderRow {
     let errors = (0..6).map(|k| 12 << k).map(|n| (SIDE / f64::from(n), error(n))).collect();
-    Row { what: "grid, f64, trilinear".into(), order: 2.0, errors, floor: 1e-7, n_halvings: 5 }
+    OrderRow { what: "grid, f64, trilinear".into(), order: 2.0, errors, floor: 1e-7, n_halvings: 5 }
 }
 
 /// Greatest difference in alpha of a small picture of n^3 voxels.
@@ -25,7 +25,7 @@ fn error(n: u32) -> f64 {
     let grid = Grid::axis_aligned(UVec3::splat(n), DVec3::splat(SIDE / f64::from(n))).expect("a grid");
     // Off every grid's symmetry, so that finer grids do not sample the same places.
     let center = grid.world_box().center() + DVec3::new(0.013, -0.027, 0.019) * SIDE;
-    let ball = Field::GaussianBall { center, sigma: 1.0, peak: 1.0 };
+    let ball = FieldFormula::GaussianBall { center, sigma: 1.0, peak: 1.0 };
     let volume = fill(&grid, ScalarType::F32, |p| ball.at(p));
     let options = BuildOptions { side: BrickSide::S32, downsampling: Downsampling::Subsample, max_bytes: None };
     let tree = build_tree(&volume, &options).expect("an octree");

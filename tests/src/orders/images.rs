@@ -12,7 +12,7 @@ use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BrickSide, Camera, Grid, Image, Knot, ScalarType, TransferFunction, Volume};
 use brickfield_optics::QuadratureRule;
 
-use super::fit::Row;
+use super::fit::OrderRow;
 use super::rays::romberg;
 use crate::volumes::fill;
 
@@ -103,22 +103,28 @@ fn row(
     floor: f64,
     n_halvings: usize,
     render: &mut dyn FnMut(&FramePlan) -> Image<f64>,
-) -> Row {
+) -> OrderRow {
     let volume = volume();
     let truth = truth(&volume);
     let errors = steps().map(|step| (step, error(&render(&plan(&volume, rule, step)), &truth))).collect();
-    Row { what: format!("picture, {what}, {}", rule.name()), order: f64::from(rule.order()), errors, floor, n_halvings }
+    OrderRow {
+        what: format!("picture, {what}, {}", rule.name()),
+        order: f64::from(rule.order()),
+        errors,
+        floor,
+        n_halvings,
+    }
 }
 
 /// The discrete f64 answer against the integral.
-pub fn reference_images() -> Vec<Row> {
+pub fn reference_images() -> Vec<OrderRow> {
     let render = |plan: &FramePlan| discrete(plan).image;
     QuadratureRule::ALL.map(|rule| row("f64", rule, 1e-14, 5, &mut { render })).into()
 }
 
 /// A backend in exact mode, as far down as f32 goes: that leaves five halvings of order 2. Of order 4 it leaves none, so
 /// there the floor itself is claimed.
-pub fn backend_images(name: &str, backend: &mut dyn Backend) -> Vec<Row> {
+pub fn backend_images(name: &str, backend: &mut dyn Backend) -> Vec<OrderRow> {
     let mut render = |plan: &FramePlan| match backend.render(plan) {
         Ok(frame) => frame.image.map(f64::from),
         Err(_) => Image::transparent(SIZE).map(|_: f64| f64::NAN),

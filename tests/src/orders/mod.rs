@@ -10,7 +10,7 @@ mod images;
 mod rays;
 
 pub use closed_forms::{ClosedForm, closed_forms};
-pub use fit::{Observed, Row};
+pub use fit::{Observed, OrderRow};
 pub use grids::grid_refinement;
 pub use images::{backend_images, reference_images};
 pub use rays::rays;

@@ -3,7 +3,7 @@
 use brickfield_core::{Knot, TransferFunction};
 use brickfield_optics::{QuadratureRule, RayState};
 
-use super::fit::Row;
+use super::fit::OrderRow;
 
 /// A smooth problem: one linear piece of transfer function under a smooth field on [0, 1].
 fn transfer() -> TransferFunction {
@@ -58,13 +58,13 @@ pub(super) fn romberg(f: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// A row for every rule: six halvings from 1/16 on.
-pub fn rays() -> Vec<Row> {
+pub fn rays() -> Vec<OrderRow> {
     let truth = truth();
     let error = |rule, n| {
         let pixel = discrete(rule, n);
         (0..4).map(|c| (pixel[c] - truth[c]).abs()).fold(0.0, f64::max)
     };
-    let row = |rule: QuadratureRule| Row {
+    let row = |rule: QuadratureRule| OrderRow {
         what: format!("ray, f64, {}", rule.name()),
         order: f64::from(rule.order()),
         errors: (4..11).map(|k| 1u32 << k).map(|n| (1.0 / f64::from(n), error(rule, n))).collect(),

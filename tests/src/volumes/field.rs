@@ -8,7 +8,7 @@ use brickfield_core::glam::DVec3;
 /// A scalar field over the world. Lengths are in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
-pub enum Field {
+pub enum FieldFormula {
     /// One value everywhere.
     Constant { value: f64 },
     /// `at_origin + gradient . p`: trilinear interpolation reproduces it.
@@ -24,23 +24,23 @@ pub enum Field {
     MarschnerLobb { center: DVec3, half_side: f64 },
 }
 
-impl Field {
+impl FieldFormula {
     /// The value at a world position.
     pub fn at(&self, p: DVec3) -> f64 {
         match *self {
-            Field::Constant { value } => value,
-            Field::Ramp { at_origin, gradient } => at_origin + gradient.dot(p),
-            Field::GaussianBall { center, sigma, peak } => {
+            FieldFormula::Constant { value } => value,
+            FieldFormula::Ramp { at_origin, gradient } => at_origin + gradient.dot(p),
+            FieldFormula::GaussianBall { center, sigma, peak } => {
                 peak * (-(p - center).length_squared() / (2.0 * sigma * sigma)).exp()
             }
-            Field::Shell { center, inner, outer, edge } => {
+            FieldFormula::Shell { center, inner, outer, edge } => {
                 let r = (p - center).length();
                 coverage(r - outer, edge) * coverage(inner - r, edge)
             }
-            Field::Slab { normal, offset, thickness, edge } => {
+            FieldFormula::Slab { normal, offset, thickness, edge } => {
                 coverage((normal.dot(p) - offset).abs() - 0.5 * thickness, edge)
             }
-            Field::MarschnerLobb { center, half_side } => marschner_lobb((p - center) / half_side),
+            FieldFormula::MarschnerLobb { center, half_side } => marschner_lobb((p - center) / half_side),
         }
     }
 
@@ -49,19 +49,22 @@ impl Field {
     /// `None` where the integral is infinite or has no closed form here.
     pub fn line_integral(&self, ray: &Ray) -> Option<f64> {
         match *self {
-            Field::GaussianBall { center, sigma, peak } => {
+            FieldFormula::GaussianBall { center, sigma, peak } => {
                 let b2 = (center - ray.origin).reject_from_normalized(ray.direction).length_squared();
                 Some(peak * sigma * (2.0 * PI).sqrt() * (-b2 / (2.0 * sigma * sigma)).exp())
             }
-            Field::Shell { center, inner, outer, edge: 0.0 } => {
+            FieldFormula::Shell { center, inner, outer, edge: 0.0 } => {
                 let b = (center - ray.origin).reject_from_normalized(ray.direction).length();
                 Some(chord(outer, b) - chord(inner, b))
             }
-            Field::Slab { normal, thickness, .. } => {
+            FieldFormula::Slab { normal, thickness, .. } => {
                 let slope = normal.dot(ray.direction).abs();
                 (slope > 0.0).then(|| thickness / slope)
             }
-            Field::Constant { .. } | Field::Ramp { .. } | Field::Shell { .. } | Field::MarschnerLobb { .. } => None,
+            FieldFormula::Constant { .. }
+            | FieldFormula::Ramp { .. }
+            | FieldFormula::Shell { .. }
+            | FieldFormula::MarschnerLobb { .. } => None,
         }
     }
 }
@@ -90,7 +93,7 @@ mod tests {
     use super::*;
 
     /// The midpoint rule along a ray, t from -100 to 100.
-    fn by_steps(field: &Field, ray: &Ray) -> f64 {
+    fn by_steps(field: &FieldFormula, ray: &Ray) -> f64 {
         let h = 1e-3;
         (0..200_000).map(|k| field.at(ray.at(-100.0 + (f64::from(k) + 0.5) * h)) * h).sum()
     }
@@ -99,9 +102,9 @@ mod tests {
     fn closed_forms_equal_sums() {
         let center = DVec3::new(1.0, 2.0, 3.0);
         let fields = [
-            Field::GaussianBall { center, sigma: 4.0, peak: 0.7 },
-            Field::Shell { center, inner: 5.0, outer: 9.0, edge: 0.0 },
-            Field::Slab { normal: DVec3::X, offset: 2.0, thickness: 6.0, edge: 1.0 },
+            FieldFormula::GaussianBall { center, sigma: 4.0, peak: 0.7 },
+            FieldFormula::Shell { center, inner: 5.0, outer: 9.0, edge: 0.0 },
+            FieldFormula::Slab { normal: DVec3::X, offset: 2.0, thickness: 6.0, edge: 1.0 },
         ];
         for field in fields {
             for origin in [DVec3::ZERO, DVec3::new(3.0, -1.0, 2.5), DVec3::new(0.0, 6.0, 0.0)] {
@@ -115,7 +118,7 @@ mod tests {
 
     #[test]
     fn marschner_lobb_stays_in_its_range_and_oscillates_24_times() {
-        let field = Field::MarschnerLobb { center: DVec3::ZERO, half_side: 1.0 };
+        let field = FieldFormula::MarschnerLobb { center: DVec3::ZERO, half_side: 1.0 };
         let row: Vec<f64> = (0..=4000).map(|i| field.at(DVec3::new(f64::from(i) / 2000.0 - 1.0, 0.0, 0.0))).collect();
         assert!(row.iter().all(|v| (0.0..=1.0).contains(v)));
         let peaks = row.windows(3).filter(|w| w[1] > w[0] && w[1] >= w[2]).count();

@@ -9,7 +9,7 @@ mod phantom;
 mod shape;
 
 pub use enlarge::enlarge;
-pub use field::Field;
+pub use field::FieldFormula;
 pub use phantom::{PHANTOM_DIMS, Phantom, phantom, phantom_camera, phantom_of, phantom_transfer};
 pub use shape::Shape;
 

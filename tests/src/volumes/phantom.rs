@@ -71,7 +71,7 @@ pub fn phantom_camera(grid: &Grid) -> Result<Camera, CameraError> {
 }
 
 /// A solid that covers the solids before it in the list.
-struct Part {
+struct Solid {
     shape: Shape,
     /// Value inside, 0 to 1.
     value: f64,
@@ -92,7 +92,7 @@ const SHARP: f64 = 2.0;
 
 /// The value at `p`, millimetres from the box's centre: x to the right of the picture (the head's left), y into the
 /// head, z up.
-fn value(parts: &[Part], p: DVec3) -> f64 {
+fn value(parts: &[Solid], p: DVec3) -> f64 {
     let painted = parts.iter().fold(AIR, |v, part| {
         let share = coverage(part.shape.distance(p), part.edge);
         v + (part.value - v) * share
@@ -106,19 +106,19 @@ fn lesion(p: DVec3) -> f64 {
     0.08 * (1.0 - r2).max(0.0).powi(3)
 }
 
-fn parts() -> Vec<Part> {
+fn parts() -> Vec<Solid> {
     [tissue(), skull(), brain(), metal()].into_iter().flatten().collect()
 }
 
-fn part(shape: Shape, value: f64, edge: f64) -> Part {
-    Part { shape, value, edge }
+fn part(shape: Shape, value: f64, edge: f64) -> Solid {
+    Solid { shape, value, edge }
 }
 
 fn ellipsoid(center: [f64; 3], radii: [f64; 3]) -> Shape {
     Shape::Ellipsoid { center: center.into(), radii: radii.into() }
 }
 
-fn tissue() -> Vec<Part> {
+fn tissue() -> Vec<Solid> {
     let neck = Shape::Capsule { from: DVec3::new(0.0, 18.0, -140.0), to: DVec3::new(0.0, 18.0, -40.0), radius: 38.0 };
     vec![
         part(neck, SKIN, SOFT),
@@ -128,7 +128,7 @@ fn tissue() -> Vec<Part> {
     ]
 }
 
-fn skull() -> Vec<Part> {
+fn skull() -> Vec<Solid> {
     let spine = |z: f64| part(ellipsoid([0.0, 34.0, z], [13.0, 14.0, 8.0]), BONE, HARD);
     let jaw = Shape::Torus { center: DVec3::new(0.0, -20.0, -44.0), axis: DVec3::Z, radius: 36.0, thickness: 7.0 };
     let mut parts = vec![
@@ -142,7 +142,7 @@ fn skull() -> Vec<Part> {
     parts
 }
 
-fn brain() -> Vec<Part> {
+fn brain() -> Vec<Solid> {
     vec![
         part(ellipsoid([-26.0, 8.0, 26.0], [23.0, 60.0, 52.0]), GREY, SOFT),
         part(ellipsoid([26.0, 8.0, 26.0], [23.0, 60.0, 52.0]), WHITE, SOFT),
@@ -151,7 +151,7 @@ fn brain() -> Vec<Part> {
 }
 
 /// An F, upright and legible from the front, and an ear ring.
-fn metal() -> Vec<Part> {
+fn metal() -> Vec<Solid> {
     let bar = |x: f64, z: f64, half: [f64; 3]| {
         let shape = Shape::Block { center: DVec3::new(x, -76.0, z), half: half.into(), x: DVec3::X, y: DVec3::Y };
         part(shape, METAL, SHARP)

@@ -8,7 +8,7 @@ use brickfield_core::glam::UVec2;
 use brickfield_frame::{RenderError, Target};
 
 use super::image::target_format;
-use super::{Device, Image};
+use super::{Device, VulkanImage};
 use crate::error::{FailedCall, OfCall};
 
 /// A render pass over one colour image that keeps the image's pixels; the image's layout is that of [`Use::Canvas`](super::Use::Canvas) before and after.
@@ -21,7 +21,7 @@ pub(super) struct RenderPass {
 pub(crate) struct Canvas {
     pub(super) framebuffer: vk::Framebuffer,
     pub(super) pass: RenderPass,
-    pub(crate) image: Image,
+    pub(crate) image: VulkanImage,
     target: Target,
     device: Arc<Device>,
 }
@@ -58,7 +58,7 @@ impl Canvas {
     pub(crate) fn new(device: &Arc<Device>, target: Target, size: UVec2) -> Result<Canvas, RenderError> {
         check(device, target)?;
         check_size(&device.physical().limits, size)?;
-        let image = Image::canvas(device, target, size)?;
+        let image = VulkanImage::canvas(device, target, size)?;
         let pass = RenderPass::new(device, target)?;
         let views = [image.view];
         let info = vk::FramebufferCreateInfo::default()

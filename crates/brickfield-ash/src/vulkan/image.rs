@@ -21,7 +21,7 @@ pub(super) const WHOLE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
 };
 
 /// An image with its view and memory.
-pub(crate) struct Image {
+pub(crate) struct VulkanImage {
     pub(super) raw: vk::Image,
     pub(super) view: vk::ImageView,
     extent: UVec3,
@@ -30,34 +30,38 @@ pub(crate) struct Image {
     memory: Option<Allocation>,
 }
 
-impl Image {
+impl VulkanImage {
     /// A 3-D texture that copies fill and read, and shaders read.
-    pub(crate) fn texture_3d(device: &Arc<Device>, format: SampleFormat, extent: UVec3) -> Result<Image, RenderError> {
+    pub(crate) fn texture_3d(
+        device: &Arc<Device>,
+        format: SampleFormat,
+        extent: UVec3,
+    ) -> Result<VulkanImage, RenderError> {
         let n_bytes = format.n_bytes() as u64 * n_texels(extent);
         let format = vulkan_format(format);
         let copies = vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
         let usage = vk::ImageUsageFlags::SAMPLED | copies;
         let info = vk::ImageCreateInfo::default().image_type(vk::ImageType::TYPE_3D).format(format).usage(usage);
-        Image::new(device, ("the atlas", n_bytes), vk::ImageViewType::TYPE_3D, info, extent)
+        VulkanImage::new(device, ("the atlas", n_bytes), vk::ImageViewType::TYPE_3D, info, extent)
     }
 
     /// A picture of four floats a pixel that shaders write and copies read.
-    pub(crate) fn picture(device: &Arc<Device>, size: UVec2) -> Result<Image, RenderError> {
+    pub(crate) fn picture(device: &Arc<Device>, size: UVec2) -> Result<VulkanImage, RenderError> {
         let usage = vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::TRANSFER_SRC;
         let format = vk::Format::R32G32B32A32_SFLOAT;
         let info = vk::ImageCreateInfo::default().image_type(vk::ImageType::TYPE_2D).format(format).usage(usage);
         let extent = size.extend(1);
-        Image::new(device, ("the picture", 16 * n_texels(extent)), vk::ImageViewType::TYPE_2D, info, extent)
+        VulkanImage::new(device, ("the picture", 16 * n_texels(extent)), vk::ImageViewType::TYPE_2D, info, extent)
     }
 
     /// A picture that polygons are blended into, that is cleared before and copied after.
-    pub(crate) fn canvas(device: &Arc<Device>, target: Target, size: UVec2) -> Result<Image, RenderError> {
+    pub(crate) fn canvas(device: &Arc<Device>, target: Target, size: UVec2) -> Result<VulkanImage, RenderError> {
         let copies = vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | copies;
         let format = target_format(target);
         let info = vk::ImageCreateInfo::default().image_type(vk::ImageType::TYPE_2D).format(format).usage(usage);
         let n_bytes = target.pixel_bytes() as u64 * n_texels(size.extend(1));
-        Image::new(device, ("the picture", n_bytes), vk::ImageViewType::TYPE_2D, info, size.extend(1))
+        VulkanImage::new(device, ("the picture", n_bytes), vk::ImageViewType::TYPE_2D, info, size.extend(1))
     }
 
     fn new(
@@ -66,12 +70,12 @@ impl Image {
         view_type: vk::ImageViewType,
         info: vk::ImageCreateInfo<'_>,
         extent: UVec3,
-    ) -> Result<Image, RenderError> {
+    ) -> Result<VulkanImage, RenderError> {
         let info = info.extent(extent_3d(extent)).mip_levels(1).array_layers(1).samples(vk::SampleCountFlags::TYPE_1);
         // SAFETY: callers keep the extent within the device's limits and the format within its features.
         let raw = unsafe { device.raw().create_image(&info, None) }
             .map_err(|code| refused("vkCreateImage", code, what, n_bytes, None))?;
-        let mut image = Image { raw, view: vk::ImageView::null(), extent, device: device.clone(), memory: None };
+        let mut image = VulkanImage { raw, view: vk::ImageView::null(), extent, device: device.clone(), memory: None };
         // SAFETY: the image is new.
         let required = unsafe { device.raw().get_image_memory_requirements(raw) };
         let memory = image.memory.insert(Allocation::new(device, what, required, Residence::Device)?);
@@ -93,7 +97,7 @@ impl Image {
     }
 }
 
-impl Drop for Image {
+impl Drop for VulkanImage {
     fn drop(&mut self) {
         // SAFETY: the device is idle, and nothing else names image or view; a null view is allowed.
         unsafe {
@@ -172,7 +176,7 @@ mod tests {
         let limit = physical.limits.max_image_dimension3_d;
         let device = Device::new(instance, physical).unwrap();
         let least = 4 * u64::from(limit).pow(3);
-        match Image::texture_3d(&device, SampleFormat::Float32, UVec3::splat(limit)).map(|_| ()) {
+        match VulkanImage::texture_3d(&device, SampleFormat::Float32, UVec3::splat(limit)).map(|_| ()) {
             Err(RenderError::OutOfMemory { n_bytes, .. } | RenderError::BufferTooLarge { n_bytes, .. }) => {
                 assert!(n_bytes >= least, "{n_bytes} of {least}");
             }

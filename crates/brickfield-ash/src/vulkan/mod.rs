@@ -28,7 +28,7 @@ pub(crate) use adapter::{PhysicalDevice, physical_devices};
 pub(crate) use buffer::{Buffer, HostBuffer};
 pub(crate) use canvas::Canvas;
 pub(crate) use device::Device;
-pub(crate) use image::{Image, Sampler, vulkan_format};
+pub(crate) use image::{Sampler, VulkanImage, vulkan_format};
 pub(crate) use instance::Instance;
 pub(crate) use memory::Residence;
 pub use messages::ValidationLog;

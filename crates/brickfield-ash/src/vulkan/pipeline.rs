@@ -10,7 +10,7 @@ use brickfield_frame::{ProxyCorner, RenderError, Resource, Target};
 use brickfield_shaders::{Binding, BindingKind, Entry, Specialised};
 
 use super::canvas::RenderPass;
-use super::{Buffer, Device, Image, Sampler};
+use super::{Buffer, Device, Sampler, VulkanImage};
 use crate::error::OfCall;
 use crate::resources::missing;
 
@@ -31,9 +31,9 @@ pub(crate) struct Pipeline {
 #[derive(Clone, Copy)]
 pub(crate) enum Bindable<'a> {
     Buffer { buffer: &'a Buffer, n_bytes: u64 },
-    Texture(&'a Image),
+    Texture(&'a VulkanImage),
     Sampler(&'a Sampler),
-    Picture(&'a Image),
+    Picture(&'a VulkanImage),
 }
 
 /// A pipeline with everything bound that it needs; the pipeline and its resources are borrowed until it is dropped.

@@ -8,7 +8,7 @@ use ash::vk;
 use brickfield_core::glam::UVec3;
 
 use super::image::{WHOLE, extent_3d};
-use super::{BoundPipeline, Buffer, Canvas, HostBuffer, Image};
+use super::{BoundPipeline, Buffer, Canvas, HostBuffer, VulkanImage};
 
 /// Records commands; their objects are borrowed for `'a`.
 pub(crate) struct Recorder<'q, 'a> {
@@ -61,7 +61,7 @@ impl<'q, 'a> Recorder<'q, 'a> {
     }
 
     /// As [`barrier`](Self::barrier) for an image, which changes its layout.
-    pub(crate) fn image_barrier(&mut self, image: &'a Image, before: Use, after: Use) {
+    pub(crate) fn image_barrier(&mut self, image: &'a VulkanImage, before: Use, after: Use) {
         let ((from_stage, from), (to_stage, to)) = (before.scope(), after.scope());
         let barrier = vk::ImageMemoryBarrier::default()
             .image(image.raw)
@@ -87,7 +87,7 @@ impl<'q, 'a> Recorder<'q, 'a> {
     }
 
     /// Copies texels into an image that is a [`Use::CopyTarget`].
-    pub(crate) fn fill(&mut self, from: &'a HostBuffer, to: &'a Image, texel_bytes: u64, boxes: &[ImageBox]) {
+    pub(crate) fn fill(&mut self, from: &'a HostBuffer, to: &'a VulkanImage, texel_bytes: u64, boxes: &[ImageBox]) {
         let regions = regions(from.buffer(), to, texel_bytes, boxes);
         let layout = Use::CopyTarget.layout();
         // SAFETY: the boxes are inside both (asserted by `regions`), buffer and image outlive the run and allow copies.
@@ -95,7 +95,7 @@ impl<'q, 'a> Recorder<'q, 'a> {
     }
 
     /// Copies texels out of an image that is a [`Use::CopySource`].
-    pub(crate) fn read_back(&mut self, from: &'a Image, to: &'a HostBuffer, texel_bytes: u64, part: ImageBox) {
+    pub(crate) fn read_back(&mut self, from: &'a VulkanImage, to: &'a HostBuffer, texel_bytes: u64, part: ImageBox) {
         let regions = regions(to.buffer(), from, texel_bytes, &[part]);
         let layout = Use::CopySource.layout();
         // SAFETY: as in `fill`.
@@ -103,7 +103,7 @@ impl<'q, 'a> Recorder<'q, 'a> {
     }
 
     /// Copies all texels of a [`Use::CopySource`] to the same place in a [`Use::CopyTarget`] that is as large or larger.
-    pub(crate) fn copy_image(&mut self, from: &'a Image, to: &'a Image) {
+    pub(crate) fn copy_image(&mut self, from: &'a VulkanImage, to: &'a VulkanImage) {
         assert!(from.extent().cmple(to.extent()).all(), "a copy past the end of an image");
         let layers = vk::ImageSubresourceLayers {
             aspect_mask: vk::ImageAspectFlags::COLOR,
@@ -118,7 +118,7 @@ impl<'q, 'a> Recorder<'q, 'a> {
     }
 
     /// Sets all texels of an image that is a [`Use::CopyTarget`] to 0.
-    pub(crate) fn clear(&mut self, image: &'a Image) {
+    pub(crate) fn clear(&mut self, image: &'a VulkanImage) {
         let (zero, layout) = (vk::ClearColorValue { float32: [0.0; 4] }, Use::CopyTarget.layout());
         // SAFETY: the image outlives the run, is a colour image, and allows transfers.
         unsafe { self.device.cmd_clear_color_image(self.commands, image.raw, layout, &zero, &[WHOLE]) };
@@ -219,7 +219,7 @@ impl Use {
     }
 }
 
-fn regions(buffer: &Buffer, image: &Image, texel_bytes: u64, boxes: &[ImageBox]) -> Vec<vk::BufferImageCopy> {
+fn regions(buffer: &Buffer, image: &VulkanImage, texel_bytes: u64, boxes: &[ImageBox]) -> Vec<vk::BufferImageCopy> {
     let region = |b: &ImageBox| {
         let texels: u64 = b.extent.to_array().into_iter().map(u64::from).product();
         assert!(b.buffer_offset + texels * texel_bytes <= buffer.n_bytes(), "a copy past the end of a buffer");

@@ -61,7 +61,7 @@ pub(super) struct CellPath {
 pub(super) struct Cells<'a> {
     volume: &'a Volume,
     last: IVec3,
-    blocks: Option<Blocks>,
+    blocks: Option<EmptyBlocks>,
 }
 
 impl<'a> Cells<'a> {
@@ -71,7 +71,7 @@ impl<'a> Cells<'a> {
 
     /// With blocks of cells that are skipped where the transfer function is 0 over their range.
     pub(super) fn with_blocks(volume: &'a Volume, transfer: &TransferFunction) -> Cells<'a> {
-        Cells { blocks: Some(Blocks::new(volume, transfer)), ..Cells::new(volume) }
+        Cells { blocks: Some(EmptyBlocks::new(volume, transfer)), ..Cells::new(volume) }
     }
 
     /// The cells along a line, in order; cells of transparent blocks are left out.
@@ -157,13 +157,13 @@ fn leave(line: &Line, mut cell: IVec3, passes: [f64; 3], (low, high): (IVec3, IV
 const BLOCK: i32 = 8;
 
 /// Which blocks of cells contribute nothing.
-struct Blocks {
+struct EmptyBlocks {
     dims: IVec3,
     transparent: Vec<bool>,
 }
 
-impl Blocks {
-    fn new(volume: &Volume, transfer: &TransferFunction) -> Blocks {
+impl EmptyBlocks {
+    fn new(volume: &Volume, transfer: &TransferFunction) -> EmptyBlocks {
         let last = volume.grid().dims().as_ivec3() - 1;
         let dims = (last + BLOCK - 1).max(IVec3::ONE) / BLOCK;
         let dims = dims.max(IVec3::ONE);
@@ -173,7 +173,7 @@ impl Blocks {
             transfer.is_transparent(range(volume, low.as_uvec3(), (low + BLOCK).min(last).as_uvec3()))
         };
         let transparent = (0..dims.x as usize * dims.y as usize * dims.z as usize).into_par_iter().map(block).collect();
-        Blocks { dims, transparent }
+        EmptyBlocks { dims, transparent }
     }
 
     /// First and last cell of the block around `cell`, if it is transparent.

@@ -17,9 +17,9 @@ use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, PlanRay};
 use brickfield_optics::{Segment, alpha, transmittance};
 
 use super::change::{Values, difference, spread};
-use super::field::Field;
+use super::field::FieldReader;
 use super::straying::straying;
-use super::walk::{Part, clip, middle, parts, segments, whole};
+use super::walk::{CutSegment, clip, middle, parts, segments, whole};
 use super::{part_values, relative, segment};
 use crate::blocks::Blocks;
 
@@ -40,7 +40,7 @@ pub(super) struct Ambiguity {
 }
 
 impl Ambiguity {
-    pub(super) fn new(field: &impl Field) -> Ambiguity {
+    pub(super) fn new(field: &impl FieldReader) -> Ambiguity {
         let knots = field.plan().transfer().knots();
         let optics = |i: usize| (knots[i].extinction, knots[i].color);
         let jump = |i: &usize| knots[*i].value == knots[i + 1].value && optics(*i) != optics(i + 1);
@@ -53,7 +53,7 @@ impl Ambiguity {
     }
 
     /// The most by which a channel of the ray's pixel may change.
-    pub(super) fn of_ray(&self, field: &impl Field, at: UVec2, ray: &PlanRay) -> f64 {
+    pub(super) fn of_ray(&self, field: &impl FieldReader, at: UVec2, ray: &PlanRay) -> f64 {
         let plan = field.plan();
         let domain = relative(plan.domain(), plan.rays().center);
         let far = domain.extent().length() / ray.direction.length() + ray.t_anchor.abs();
@@ -74,7 +74,7 @@ impl Ambiguity {
         span.map_or(0.0, |span| alpha(self.max_extinction * (span.end - span.start)))
     }
 
-    fn inside(&self, field: &impl Field, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
+    fn inside(&self, field: &impl FieldReader, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
         let sampling = &field.plan().sampling();
         let appearing = match sampling.lengths() {
             Lengths::True => 0.0,
@@ -93,7 +93,7 @@ impl Ambiguity {
     }
 
     /// The change by nodes that fall on the other side of a jump.
-    fn changing(&self, field: &impl Field, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
+    fn changing(&self, field: &impl FieldReader, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
         let plan = field.plan();
         let (mut bound, mut least_depth) = (0.0, 0.0);
         let rule = plan.sampling().rule();
@@ -113,7 +113,7 @@ impl Ambiguity {
 
     /// The change by segments of nominal length whose middle is within rounding of an end of the divided span: they may count
     /// or not.
-    fn appearing(&self, field: &impl Field, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
+    fn appearing(&self, field: &impl FieldReader, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
         let plan = field.plan();
         let of = |span: Span, b: Aabb, level: Level, cell| {
             let nominal = plan.sampling().step_world() * f64::from(level.stride());
@@ -136,14 +136,14 @@ impl Ambiguity {
     }
 
     /// Whether a node at `q` could be close to a jump; quick, and never wrongly no.
-    fn may_be_close(&self, field: &impl Field, part: Part, q: DVec3, delta: DVec3) -> bool {
+    fn may_be_close(&self, field: &impl FieldReader, part: CutSegment, q: DVec3, delta: DVec3) -> bool {
         let q = field.clamped(q);
         let at_face = || part.cell.is_none() && field.cell_at(q - delta) != field.cell_at(q + delta);
         !self.jumps.is_empty() || at_face()
     }
 
     /// The values that a node of `part` at `q` may have.
-    fn values(&self, field: &impl Field, part: Part, q: DVec3, delta: DVec3) -> Values {
+    fn values(&self, field: &impl FieldReader, part: CutSegment, q: DVec3, delta: DVec3) -> Values {
         let q = field.clamped(q);
         let own = part.cell.unwrap_or_else(|| field.cell_at(q));
         let mut values = vec![field.value(&field.patch_of(own), q)];
@@ -161,7 +161,7 @@ impl Ambiguity {
     }
 
     /// Adds both sides of the jumps that the value in `cell` is close to.
-    fn beyond_jumps(&self, field: &impl Field, cell: UVec3, q: DVec3, delta: DVec3, values: &mut Values) {
+    fn beyond_jumps(&self, field: &impl FieldReader, cell: UVec3, q: DVec3, delta: DVec3, values: &mut Values) {
         let (false, Some(at)) = (self.jumps.is_empty(), field.around(&field.patch_of(cell), q)) else { return };
         let Some(value) = field.value(&field.patch_of(cell), q) else { return };
         let (gain, (min, max)) = (field.gain(), at.range());

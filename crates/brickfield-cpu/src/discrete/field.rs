@@ -39,7 +39,7 @@ impl Stored for Float32 {
 }
 
 /// A field: from a position to the patch that owns it, and to the value there.
-pub(super) trait Field: Sync {
+pub(super) trait FieldReader: Sync {
     /// The plan whose field it is.
     fn plan(&self) -> &FramePlan;
 
@@ -117,7 +117,7 @@ impl<'a, S: Stored> Shared<'a, S> {
     }
 }
 
-impl<S: Stored> Field for Shared<'_, S> {
+impl<S: Stored> FieldReader for Shared<'_, S> {
     #[inline]
     fn plan(&self) -> &FramePlan {
         self.plan

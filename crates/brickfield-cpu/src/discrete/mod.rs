@@ -17,9 +17,9 @@ use brickfield_optics::{QuadratureRule, RayState, Segment};
 use rayon::prelude::*;
 
 use ambiguity::Ambiguity;
-use field::{Field, Float32, Shared, Stored, Unorm8, Unorm16};
+use field::{FieldReader, Float32, Shared, Stored, Unorm8, Unorm16};
 pub use rounding::{filter_rounding, position_rounding};
-use walk::{Part, clip, parts};
+use walk::{CutSegment, clip, parts};
 
 /// The sum of a plan, and how far f32 may stray from it where the field jumps.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,7 +88,7 @@ fn render<S: Stored>(plan: &FramePlan) -> Discrete {
     }
 }
 
-fn pixel(field: &impl Field, ambiguity: &Ambiguity, at: UVec2) -> Pixel {
+fn pixel(field: &impl FieldReader, ambiguity: &Ambiguity, at: UVec2) -> Pixel {
     let ray = field.plan().rays().ray(at.x, at.y);
     let own = along(field, &ray);
     let across = field.plan().rays().ray_across_tie(at.x, at.y, ambiguity::TIE).map(|other| along(field, &other));
@@ -97,7 +97,7 @@ fn pixel(field: &impl Field, ambiguity: &Ambiguity, at: UVec2) -> Pixel {
 }
 
 /// The sum along a ray.
-fn along(field: &impl Field, ray: &PlanRay) -> Pixel {
+fn along(field: &impl FieldReader, ray: &PlanRay) -> Pixel {
     let (plan, mut pixel) = (field.plan(), Pixel::default());
     let Some(span) = clip(ray, &relative(plan.domain(), plan.rays().center), ray.t_eye) else { return pixel };
     let mut state = RayState::default();
@@ -120,7 +120,7 @@ fn greatest_difference(a: &[f64; 4], b: &[f64; 4]) -> f64 {
 }
 
 /// The values at the nodes of a segment.
-fn part_values(field: &impl Field, ray: &PlanRay, part: Part) -> [Option<f64>; 2] {
+fn part_values(field: &impl FieldReader, ray: &PlanRay, part: CutSegment) -> [Option<f64>; 2] {
     node_values(field.plan().sampling().rule(), |x| {
         let q = field.plan().rays().center + ray.at(part.at(x));
         match part.cell {
@@ -154,7 +154,7 @@ fn one_gauss_node(plan: &FramePlan, value: f64, length_world: f64) -> Segment {
 }
 
 /// How many nodes of a visible segment have an extinction above 0.
-fn n_visible(field: &impl Field, values: &[Option<f64>; 2]) -> u64 {
+fn n_visible(field: &impl FieldReader, values: &[Option<f64>; 2]) -> u64 {
     if field.plan().sampling().rule().nodes().len() == 1 {
         return 1;
     }

@@ -24,9 +24,9 @@ use brickfield_optics::transmittance;
 use rayon::prelude::*;
 
 use super::change::{Values, spread};
-use super::field::{Field, Float32, Shared, Stored, Unorm8, Unorm16};
+use super::field::{FieldReader, Float32, Shared, Stored, Unorm8, Unorm16};
 use super::relative;
-use super::walk::{Part, clip, parts};
+use super::walk::{CutSegment, clip, parts};
 
 /// Roundings that `RayFrame::rounding` reckons with at worst; here one of them.
 const AT_WORST: f64 = 8.0;
@@ -71,7 +71,7 @@ fn of_picture<S: Stored>(plan: &FramePlan, cause: Cause) -> Vec<f64> {
     (0..size.x * size.y).into_par_iter().map(pixel).collect()
 }
 
-fn of_pixel(field: &impl Field, at: UVec2, cause: Cause) -> f64 {
+fn of_pixel(field: &impl FieldReader, at: UVec2, cause: Cause) -> f64 {
     let plan = field.plan();
     let ray = &plan.rays().ray(at.x, at.y);
     let Some(span) = clip(ray, &relative(plan.domain(), plan.rays().center), ray.t_eye) else { return 0.0 };
@@ -92,7 +92,7 @@ fn of_pixel(field: &impl Field, at: UVec2, cause: Cause) -> f64 {
 }
 
 /// How far filtering may move a value between samples of a range, in data values.
-fn filtered(field: &impl Field, range: f64, bits: u32) -> f64 {
+fn filtered(field: &impl FieldReader, range: f64, bits: u32) -> f64 {
     let weights = 3.0 * (-f64::from(bits)).exp2() * range;
     let by_code = field.plan().field().slots().format() == SampleFormat::Unorm8 && bits < f32::MANTISSA_DIGITS - 1;
     let code = if by_code { CODES * field.gain() } else { 0.0 };
@@ -102,7 +102,7 @@ fn filtered(field: &impl Field, range: f64, bits: u32) -> f64 {
 
 /// The values that a node at `q` may have; none where its block is empty. `stray` takes the range of the samples around it, in
 /// data values, and how many voxels they are apart.
-fn values(field: &impl Field, part: Part, q: DVec3, stray: impl Fn(f64, f64) -> f64) -> Values {
+fn values(field: &impl FieldReader, part: CutSegment, q: DVec3, stray: impl Fn(f64, f64) -> f64) -> Values {
     let q = field.clamped(q);
     let cell = part.cell.unwrap_or_else(|| field.cell_at(q));
     let patch = field.patch_of(cell);

@@ -11,8 +11,8 @@ use brickfield_frame::{FramePlan, PlanRay};
 use brickfield_optics::{Segment, transmittance};
 
 use super::change::difference;
-use super::field::Field;
-use super::walk::{Part, parts_in_block, segments};
+use super::field::FieldReader;
+use super::walk::{CutSegment, parts_in_block, segments};
 use super::{part_values, segment};
 use crate::blocks::{Blocks, Crossing};
 
@@ -35,7 +35,7 @@ struct Light {
 
 /// The most by which a channel of the ray's pixel may change if its positions are off by `delta`.
 pub(super) fn straying(
-    field: &impl Field,
+    field: &impl FieldReader,
     ray: &PlanRay,
     span: Span,
     delta: DVec3,
@@ -90,7 +90,7 @@ fn ways_beside(plan: &FramePlan, ray: &PlanRay, along: Span, delta: DVec3) -> Ve
 
 /// The change along a span if its blocks are crossed in any of other ways.
 fn change_along(
-    field: &impl Field,
+    field: &impl FieldReader,
     ray: &PlanRay,
     along: Span,
     step: f64,
@@ -115,9 +115,9 @@ fn change_along(
 }
 
 /// The light of a piece of a ray that crosses blocks.
-fn light(field: &impl Field, ray: &PlanRay, crossings: &[Crossing], piece: Span) -> Light {
+fn light(field: &impl FieldReader, ray: &PlanRay, crossings: &[Crossing], piece: Span) -> Light {
     let mut light = Light::default();
-    let of = |part: Part| segment(field.plan(), part_values(field, ray, part), part.length);
+    let of = |part: CutSegment| segment(field.plan(), part_values(field, ray, part), part.length);
     for crossing in crossings {
         let span = Span { start: piece.start.max(crossing.span.start), end: piece.end.min(crossing.span.end) };
         for part in parts_in_block(field.plan(), ray, span, crossing.cell) {

@@ -8,7 +8,7 @@ use crate::blocks::Blocks;
 
 /// A segment of a ray, already cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Part {
+pub(super) struct CutSegment {
     start: f64,
     end: f64,
     /// The length that its light is computed for, in world units.
@@ -17,13 +17,13 @@ pub(super) struct Part {
     pub(super) cell: Option<UVec3>,
 }
 
-impl Part {
+impl CutSegment {
     /// The segment cut in two.
-    pub(super) fn halves(self) -> [Part; 2] {
+    pub(super) fn halves(self) -> [CutSegment; 2] {
         let middle = self.at(0.5);
         [
-            Part { end: middle, length: 0.5 * self.length, ..self },
-            Part { start: middle, length: 0.5 * self.length, ..self },
+            CutSegment { end: middle, length: 0.5 * self.length, ..self },
+            CutSegment { start: middle, length: 0.5 * self.length, ..self },
         ]
     }
 
@@ -34,7 +34,7 @@ impl Part {
 }
 
 /// The segments of a ray's span in the domain, front to back (ARCHITECTURE.md, rule 2).
-pub(super) fn parts(plan: &FramePlan, ray: &PlanRay, span: Span) -> Vec<Part> {
+pub(super) fn parts(plan: &FramePlan, ray: &PlanRay, span: Span) -> Vec<CutSegment> {
     match plan.sampling().division() {
         Division::Ray => divided(plan, ray, span, Level(0), None),
         Division::Brick => {
@@ -44,7 +44,7 @@ pub(super) fn parts(plan: &FramePlan, ray: &PlanRay, span: Span) -> Vec<Part> {
 }
 
 /// The segments of a span, if all of it is in the block that has an index cell.
-pub(super) fn parts_in_block(plan: &FramePlan, ray: &PlanRay, span: Span, cell: UVec3) -> Vec<Part> {
+pub(super) fn parts_in_block(plan: &FramePlan, ray: &PlanRay, span: Span, cell: UVec3) -> Vec<CutSegment> {
     match plan.field().index().at(cell) {
         _ if span.start >= span.end => Vec::new(),
         IndexEntry::Resident { .. } => divided(plan, ray, span, plan.field().level_at(cell), Some(cell)),
@@ -52,7 +52,7 @@ pub(super) fn parts_in_block(plan: &FramePlan, ray: &PlanRay, span: Span, cell: 
     }
 }
 
-fn divided(plan: &FramePlan, ray: &PlanRay, span: Span, level: Level, cell: Option<UVec3>) -> Vec<Part> {
+fn divided(plan: &FramePlan, ray: &PlanRay, span: Span, level: Level, cell: Option<UVec3>) -> Vec<CutSegment> {
     let nominal = plan.sampling().step_world() * f64::from(level.stride());
     let uncut = segments(span, nominal * ray.stretch);
     match plan.sampling().lengths() {
@@ -76,14 +76,14 @@ fn is_inside(t: f64, span: Span) -> bool {
 }
 
 /// A segment with its true length.
-fn cut(segment: Span, span: Span, cell: Option<UVec3>) -> Option<Part> {
+fn cut(segment: Span, span: Span, cell: Option<UVec3>) -> Option<CutSegment> {
     let (start, end) = (segment.start.max(span.start), segment.end.min(span.end));
-    (start < end).then_some(Part { start, end, length: end - start, cell })
+    (start < end).then_some(CutSegment { start, end, length: end - start, cell })
 }
 
 /// A segment that counts as a whole, for a given length.
-pub(super) fn whole(Span { start, end }: Span, length: f64, cell: Option<UVec3>) -> Part {
-    Part { start, end, length, cell }
+pub(super) fn whole(Span { start, end }: Span, length: f64, cell: Option<UVec3>) -> CutSegment {
+    CutSegment { start, end, length, cell }
 }
 
 /// Where a ray with parameter at least `least` runs in the half-open box `b` (relative to the frame's centre).

@@ -2,8 +2,6 @@
 //!
 //! Indices are held below a bound that the compiler knows, so that no bounds check is left.
 
-use brickfield_frame::SampleFormat;
-
 /// Nodes that are interpolated together.
 pub(super) const LANES: usize = 16;
 
@@ -14,12 +12,12 @@ pub(super) type Lanes = [f32; LANES];
 pub(super) trait Stored: Copy + Send + Sync + 'static {
     /// Bytes of a sample.
     const N_BYTES: usize;
-    /// The format.
-    const FORMAT: SampleFormat;
     /// Two samples that are neighbours along x, as they are stored.
     type Pair: Copy + Default;
     /// Samples `i` and `i + 1` of a brick.
     fn pair(bytes: &[u8], i: usize) -> Self::Pair;
+    /// The stored number of sample `i`.
+    fn number(bytes: &[u8], i: usize) -> f32;
     /// The stored numbers of a pair, less `bias`.
     fn split(pair: Self::Pair, bias: f32) -> (f32, f32);
 }
@@ -33,12 +31,15 @@ pub(super) struct Float32;
 
 impl Stored for Unorm8 {
     const N_BYTES: usize = 1;
-    const FORMAT: SampleFormat = SampleFormat::Unorm8;
     type Pair = u32;
     #[inline(always)]
     fn pair(bytes: &[u8], i: usize) -> u32 {
         let b = &bytes[i..i + 2];
         u32::from(u16::from_le_bytes([b[0], b[1]]))
+    }
+    #[inline(always)]
+    fn number(bytes: &[u8], i: usize) -> f32 {
+        f32::from(bytes[i])
     }
     #[inline(always)]
     fn split(pair: u32, _: f32) -> (f32, f32) {
@@ -48,12 +49,15 @@ impl Stored for Unorm8 {
 
 impl Stored for Unorm16 {
     const N_BYTES: usize = 2;
-    const FORMAT: SampleFormat = SampleFormat::Unorm16;
     type Pair = u32;
     #[inline(always)]
     fn pair(bytes: &[u8], i: usize) -> u32 {
         let b = &bytes[2 * i..2 * i + 4];
         u32::from_le_bytes([b[0], b[1], b[2], b[3]])
+    }
+    #[inline(always)]
+    fn number(bytes: &[u8], i: usize) -> f32 {
+        f32::from(u16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]]))
     }
     /// 16 bits leave f32 only 8 bits for fractions: numbers are counted from the one that stands for the first knot.
     #[inline(always)]
@@ -64,12 +68,16 @@ impl Stored for Unorm16 {
 
 impl Stored for Float32 {
     const N_BYTES: usize = 4;
-    const FORMAT: SampleFormat = SampleFormat::Float32;
     type Pair = u64;
     #[inline(always)]
     fn pair(bytes: &[u8], i: usize) -> u64 {
         let b = &bytes[4 * i..4 * i + 8];
         u64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]])
+    }
+    #[inline(always)]
+    fn number(bytes: &[u8], i: usize) -> f32 {
+        let b = &bytes[4 * i..4 * i + 4];
+        f32::from_le_bytes([b[0], b[1], b[2], b[3]])
     }
     #[inline(always)]
     fn split(pair: u64, _: f32) -> (f32, f32) {

@@ -4,17 +4,18 @@ use std::ops::Range;
 
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Level, Span};
-use brickfield_frame::{Division, IndexEntry, Lengths, PlanRay, Sampling};
+use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, PlanRay, Sampling};
 
 use super::batch;
 use super::brick::{LANES, Nodes, Stored};
+use super::classify::Classifier;
 use super::detail::Sieve;
-use super::scene::{Block, Scene};
+use super::f32_plan::{Block, F32Plan};
 use super::segment::{Ray32, Segment32, segment};
 use crate::blocks::Blocks;
 
-/// What is divided of a ray: segments first..end, the first and the last of them cut to the span.
-struct Path<'a> {
+/// The segments of a ray's span: first..end, the first and the last of them cut to the span.
+pub(super) struct Path<'a> {
     ray: &'a PlanRay,
     span: Span,
     step: f64,
@@ -24,14 +25,14 @@ struct Path<'a> {
     /// Segments per world unit, and world units per voxel along each axis.
     per_unit: f64,
     reciprocal: DVec3,
-    first: i64,
-    end: i64,
+    pub(super) first: i64,
+    pub(super) end: i64,
 }
 
 impl<'a> Path<'a> {
     /// A span, divided by the steps of a level.
     #[inline(always)]
-    fn new(sampling: &Sampling, ray: &'a PlanRay, span: Span, level: Level) -> Path<'a> {
+    pub(super) fn new(sampling: &Sampling, ray: &'a PlanRay, span: Span, level: Level) -> Path<'a> {
         let nominal = sampling.step_world() * f64::from(level.stride());
         let step = nominal * ray.stretch;
         let length = match sampling.lengths() {
@@ -79,14 +80,14 @@ const MOST: i64 = 1 << 23;
 
 /// The pixel of a ray, of which some runs of segments may see something, front to back.
 #[inline(always)]
-pub(super) fn march<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
-    let plan = scene.plan;
-    let domain = (plan.domain().min - scene.center, plan.domain().max - scene.center);
+pub(super) fn march<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
+    let plan = plan32.plan;
+    let domain = (plan.domain().min - plan32.center, plan.domain().max - plan32.center);
     let Some(span) = clip(ray, domain, ray.t_eye) else { return [0.0; 4] };
     let mut state = Ray32::default();
     match plan.sampling().division() {
-        Division::Ray => along(scene, &Path::new(plan.sampling(), ray, span, Level(0)), runs, &mut state),
-        Division::Brick => brick_by_brick(scene, ray, span, &mut state),
+        Division::Ray => along(plan32, &Path::new(plan.sampling(), ray, span, Level(0)), runs, &mut state),
+        Division::Brick => brick_by_brick(plan32, ray, span, &mut state),
     }
     state.rgba()
 }
@@ -97,16 +98,16 @@ fn floor(x: f64) -> i64 {
 
 /// The segments of some runs, block by block.
 #[inline(always)]
-fn along<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, runs: &[Range<i64>], state: &mut Ray32) {
-    let nodes = scene.plan.sampling().rule().nodes();
+fn along<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, path: &Path, runs: &[Range<i64>], state: &mut Ray32) {
+    let nodes = plan32.plan.sampling().rule().nodes();
     let (near, far) = (nodes[0], nodes[nodes.len() - 1]);
-    let floor = scene.plan.sampling().transmittance_floor();
+    let floor = plan32.plan.sampling().transmittance_floor();
     for segments in runs {
         let (mut k, to) = (path.first.max(segments.start), path.end.min(segments.end));
         while k < to {
-            let n = if path.is_whole(k) { run(scene, path, k, (near, far), to, state) } else { 0 };
+            let n = if path.is_whole(k) { run(plan32, path, k, (near, far), to, state) } else { 0 };
             if n == 0 {
-                state.push(single(scene, path, k));
+                state.push(single(plan32, path, k));
             }
             k += n.max(1);
             if state.transmittance < floor || state.transmittance == 0.0 {
@@ -118,25 +119,25 @@ fn along<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, runs: &[Ra
 
 /// The segments of each brick.
 #[inline(always)]
-fn brick_by_brick<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRay, span: Span, state: &mut Ray32) {
-    let nodes = scene.plan.sampling().rule().nodes();
+fn brick_by_brick<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, ray: &PlanRay, span: Span, state: &mut Ray32) {
+    let nodes = plan32.plan.sampling().rule().nodes();
     let nodes = (nodes[0], nodes[nodes.len() - 1]);
-    let floor = scene.plan.sampling().transmittance_floor();
-    for crossing in Blocks::new(scene.plan, ray, span) {
+    let floor = plan32.plan.sampling().transmittance_floor();
+    for crossing in Blocks::new(plan32.plan, ray, span) {
         let IndexEntry::Resident { slot, reach } = crossing.entry else { continue };
         let level = reach.level_of_brick();
-        let path = Path::new(scene.plan.sampling(), ray, crossing.span, level);
-        let block = scene.block_of(crossing.cell);
+        let path = Path::new(plan32.plan.sampling(), ray, crossing.span, level);
+        let block = plan32.block_of(crossing.cell);
         let resident = Resident { block: &block, slot, level };
-        state.push(single_in(scene, &path, &block, path.first));
+        state.push(single_in(plan32, &path, &block, path.first));
         let mut k = path.first + 1;
         while k < path.end - 1 {
             let n = (path.end - 1 - k).min(MOST);
-            resident.run(scene, &path, k, nodes, n as i32, state);
+            resident.run(plan32, &path, k, nodes, n as i32, state);
             k += n;
         }
         if path.end - 1 > path.first {
-            state.push(single_in(scene, &path, &block, path.end - 1));
+            state.push(single_in(plan32, &path, &block, path.end - 1));
         }
         if state.transmittance < floor || state.transmittance == 0.0 {
             return;
@@ -145,32 +146,33 @@ fn brick_by_brick<const N: usize, S: Stored>(scene: &Scene<N, S>, ray: &PlanRay,
 }
 
 /// One segment whose nodes lie in a block.
-fn single_in<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, block: &Block, k: i64) -> Segment32 {
-    one(scene, path, k, |q| scene.value_in(block, q))
+fn single_in<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, path: &Path, block: &Block, k: i64) -> Segment32 {
+    one((plan32.plan, &plan32.transfer), path, k, |q| plan32.value_in(block, q))
 }
 
 /// One segment, wherever its nodes lie.
-fn single<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, k: i64) -> Segment32 {
-    one(scene, path, k, |q| scene.value(q))
+fn single<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, path: &Path, k: i64) -> Segment32 {
+    one((plan32.plan, &plan32.transfer), path, k, |q| plan32.value(q))
 }
 
-fn one<const N: usize, S: Stored>(
-    scene: &Scene<N, S>,
+/// One segment, by the values at its nodes' sample positions.
+pub(super) fn one(
+    (plan, transfer): (&FramePlan, &Classifier),
     path: &Path,
     k: i64,
     value: impl Fn(DVec3) -> Option<f32>,
 ) -> Segment32 {
-    let rule = scene.plan.sampling().rule();
+    let rule = plan.sampling().rule();
     let (start, length, weight) = path.segment(k);
-    let value = |x: &f64| value(scene.center + path.ray.at(start + length * x));
+    let value = |x: &f64| value(plan.rays().center + path.ray.at(start + length * x));
     let nodes = rule.nodes();
-    segment(rule, &scene.transfer, [value(&nodes[0]), nodes.get(1).and_then(value)], weight)
+    segment(rule, transfer, [value(&nodes[0]), nodes.get(1).and_then(value)], weight)
 }
 
 /// All whole segments from `k` on whose nodes lie in the block of segment `k`'s first node; returns how many they are.
 #[inline(always)]
 fn run<const N: usize, S: Stored>(
-    scene: &Scene<N, S>,
+    plan32: &F32Plan<N, S>,
     path: &Path,
     k: i64,
     (near, far): (f64, f64),
@@ -178,11 +180,11 @@ fn run<const N: usize, S: Stored>(
     state: &mut Ray32,
 ) -> i64 {
     let t = (k as f64 + near) * path.step;
-    let block = scene.block(scene.center + path.ray.at(t));
-    let exit = exit(scene, path, &block);
+    let block = plan32.block(plan32.center + path.ray.at(t));
+    let exit = exit(plan32, path, &block);
     let n = ((exit * path.per_unit - far).ceil() - k as f64).min((to.min(path.end - 1) - k).min(MOST) as f64) as i32;
     if let (IndexEntry::Resident { slot, reach }, true) = (block.entry, n > 0) {
-        Resident { block: &block, slot, level: reach.level_of_brick() }.run(scene, path, k, (near, far), n, state);
+        Resident { block: &block, slot, level: reach.level_of_brick() }.run(plan32, path, k, (near, far), n, state);
     }
     // Rounding may have put the node into a block that the ray has left already.
     i64::from(n.max(0))
@@ -200,7 +202,7 @@ impl Resident<'_> {
     #[inline(always)]
     fn run<const N: usize, S: Stored>(
         &self,
-        scene: &Scene<N, S>,
+        plan32: &F32Plan<N, S>,
         path: &Path,
         k: i64,
         (near, far): (f64, f64),
@@ -212,27 +214,27 @@ impl Resident<'_> {
         let array = |v: DVec3| v.as_vec3().to_array();
         let corner = self.block.corner;
         let nodes = Nodes {
-            origin: array((scene.center + path.ray.at(t) - corner) * scale),
+            origin: array((plan32.center + path.ray.at(t) - corner) * scale),
             change: array(path.ray.direction * (path.step * scale)),
-            last: array(((scene.last - corner) * scale).min(DVec3::splat((N - 1) as f64))),
-            bias: scene.bias,
+            last: array(((plan32.last - corner) * scale).min(DVec3::splat((N - 1) as f64))),
+            bias: plan32.numbers.bias,
         };
         let far = (far - near) as f32;
-        let brick = scene.brick(self.slot);
+        let brick = plan32.brick(self.slot);
         let mut inner = Inner { brick, nodes, far, length: path.length, waiting: [0; 2 * LANES] };
-        match scene.plan.occupancy() {
+        match plan32.plan.occupancy() {
             Some(occupancy) => {
-                inner.push_visible(scene, &Sieve::<N>::new(nodes, far, occupancy.brick(self.slot)), n, state);
+                inner.push_visible(plan32, &Sieve::<N>::new(nodes, far, occupancy.brick(self.slot)), n, state);
             }
-            None => inner.push_all(scene, n, state),
+            None => inner.push_all(plan32, n, state),
         }
     }
 }
 
 /// Where the ray leaves a block.
 #[inline(always)]
-fn exit<const N: usize, S: Stored>(scene: &Scene<N, S>, path: &Path, block: &Block) -> f64 {
-    let origin = path.ray.anchor + scene.center;
+fn exit<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, path: &Path, block: &Block) -> f64 {
+    let origin = path.ray.anchor + plan32.center;
     let mut exit = f64::INFINITY;
     for axis in 0..3 {
         let d = path.ray.direction[axis];
@@ -260,13 +262,13 @@ struct Inner<'a> {
 impl Inner<'_> {
     /// Segments `0..n`, one after the other.
     #[inline(always)]
-    fn push_all<const N: usize, S: Stored>(&mut self, scene: &Scene<N, S>, n: i32, state: &mut Ray32) {
+    fn push_all<const N: usize, S: Stored>(&mut self, plan32: &F32Plan<N, S>, n: i32, state: &mut Ray32) {
         for first in (0..n).step_by(LANES) {
             for (l, k) in self.waiting.iter_mut().enumerate() {
                 *k = first + l as i32;
             }
-            self.look(scene, ((n - first) as usize).min(LANES), state);
-            if state.transmittance < scene.plan.sampling().transmittance_floor() {
+            self.look(plan32, ((n - first) as usize).min(LANES), state);
+            if state.transmittance < plan32.plan.sampling().transmittance_floor() {
                 return;
             }
         }
@@ -276,7 +278,7 @@ impl Inner<'_> {
     #[inline(always)]
     fn push_visible<const N: usize, S: Stored>(
         &mut self,
-        scene: &Scene<N, S>,
+        plan32: &F32Plan<N, S>,
         sieve: &Sieve<N>,
         n: i32,
         state: &mut Ray32,
@@ -294,8 +296,8 @@ impl Inner<'_> {
                 visible &= visible - 1;
             }
             if n_waiting >= LANES {
-                self.look(scene, LANES, state);
-                if state.transmittance < scene.plan.sampling().transmittance_floor() {
+                self.look(plan32, LANES, state);
+                if state.transmittance < plan32.plan.sampling().transmittance_floor() {
                     return;
                 }
                 n_waiting -= LANES;
@@ -304,25 +306,25 @@ impl Inner<'_> {
             first = next;
         }
         if n_waiting > 0 {
-            self.look(scene, n_waiting, state);
+            self.look(plan32, n_waiting, state);
         }
     }
 
     /// Puts the first `n` segments that wait behind what has been seen so far.
     #[inline(always)]
-    fn look<const N: usize, S: Stored>(&self, scene: &Scene<N, S>, n: usize, state: &mut Ray32) {
+    fn look<const N: usize, S: Stored>(&self, plan32: &F32Plan<N, S>, n: usize, state: &mut Ray32) {
         let mut at = [0f32; LANES];
         for (at, k) in at.iter_mut().zip(&self.waiting) {
             *at = *k as f32;
         }
-        let (rule, length) = (scene.plan.sampling().rule(), self.length);
-        let near = scene.first_values(&self.nodes, self.brick, &at, n);
+        let (rule, length) = (plan32.plan.sampling().rule(), self.length);
+        let near = plan32.first_values(&self.nodes, self.brick, &at, n);
         match rule.nodes().len() {
-            1 => batch::one_node(rule, &scene.transfer, &near, n, length, state),
+            1 => batch::one_node(rule, &plan32.transfer, &near, n, length, state),
             _ => {
                 at.iter_mut().for_each(|at| *at += self.far);
-                let far = scene.first_values(&self.nodes, self.brick, &at, n);
-                batch::two_nodes(rule, &scene.transfer, (&near, &far), n, length, state);
+                let far = plan32.first_values(&self.nodes, self.brick, &at, n);
+                batch::two_nodes(rule, &plan32.transfer, (&near, &far), n, length, state);
             }
         }
     }
@@ -330,7 +332,7 @@ impl Inner<'_> {
 
 /// Where the ray runs in a box relative to the frame's centre, at parameters of at least `least`.
 #[inline(always)]
-fn clip(ray: &PlanRay, (min, max): (DVec3, DVec3), least: f64) -> Option<Span> {
+pub(super) fn clip(ray: &PlanRay, (min, max): (DVec3, DVec3), least: f64) -> Option<Span> {
     let (mut start, mut end) = (least - ray.t_anchor, f64::INFINITY);
     for axis in 0..3 {
         let (o, d) = (ray.anchor[axis], ray.direction[axis]);

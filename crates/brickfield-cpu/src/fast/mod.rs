@@ -4,23 +4,28 @@ mod batch;
 mod brick;
 mod classify;
 mod detail;
+mod f32_plan;
 mod march;
+mod placed;
 mod scalar;
-mod scene;
+
 mod segment;
 
+use std::ops::Range;
 use std::time::Instant;
 
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{BrickSide, Image};
 use brickfield_frame::{
-    Backend, Capabilities, Description, Evaluate, Frame, FramePlan, Places, RenderError, SampleFormat, ShaderFunction,
-    Timing, check_memory,
+    Backend, Capabilities, Description, Evaluate, Frame, FramePlan, Places, PlanRay, RenderError, SampleFormat,
+    ShaderFunction, Timing, check_memory,
 };
 use rayon::prelude::*;
 
 use brick::{Float32, Stored, Unorm8, Unorm16};
-use scene::Scene;
+use classify::Classifier;
+use f32_plan::F32Plan;
+use placed::PlacedPlan;
 
 /// Most pixels along a side of a picture.
 const MAX_IMAGE: u32 = 1 << 16;
@@ -74,7 +79,7 @@ impl Backend for CpuBackend {
             return Ok(Frame::new(Image::transparent(plan.size()), Timing::default()));
         }
         let begin = Instant::now();
-        let image = dispatch(plan, Rendering)?;
+        let image = dispatch(plan, Rendering);
         Ok(Frame::new(image, Timing::of_rendering(milliseconds(begin))))
     }
 
@@ -91,17 +96,49 @@ impl Evaluate for CpuBackend {
         inputs: &[[f32; 4]],
     ) -> Result<Vec<[f32; 4]>, RenderError> {
         check(plan)?;
-        dispatch(plan, Evaluation { function, inputs })
+        Ok(dispatch(plan, Evaluation { function, inputs }))
     }
 }
 
-/// Work on a scene of any brick side and format.
-trait Work {
-    type Output;
-    fn run<const N: usize, S: Stored>(self, scene: &Scene<N, S>) -> Self::Output;
+/// A plan in f32, whatever the size and format of its slots.
+trait Renderer: Sync {
+    fn plan(&self) -> &FramePlan;
+
+    fn transfer(&self) -> &Classifier;
+
+    /// The value at a sample position, as a number of the value scale; `None` where its block is empty.
+    fn value(&self, q: DVec3) -> Option<f32>;
+
+    /// The pixel of a ray, of which some runs of segments may see something, front to back.
+    fn pixel(&self, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4];
 }
 
-fn dispatch<W: Work>(plan: &FramePlan, work: W) -> Result<W::Output, RenderError> {
+impl<const N: usize, S: Stored> Renderer for F32Plan<'_, N, S> {
+    fn plan(&self) -> &FramePlan {
+        self.plan
+    }
+
+    fn transfer(&self) -> &Classifier {
+        &self.transfer
+    }
+
+    fn value(&self, q: DVec3) -> Option<f32> {
+        F32Plan::value(self, q)
+    }
+
+    #[inline(always)]
+    fn pixel(&self, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
+        march::march(self, ray, runs)
+    }
+}
+
+/// Work on a plan of any kind.
+trait Work {
+    type Output;
+    fn run(self, renderer: &impl Renderer) -> Self::Output;
+}
+
+fn dispatch<W: Work>(plan: &FramePlan, work: W) -> W::Output {
     match plan.field().slots().format() {
         SampleFormat::Unorm8 => dispatch_side::<Unorm8, W>(plan, work),
         SampleFormat::Unorm16 => dispatch_side::<Unorm16, W>(plan, work),
@@ -109,12 +146,12 @@ fn dispatch<W: Work>(plan: &FramePlan, work: W) -> Result<W::Output, RenderError
     }
 }
 
-fn dispatch_side<S: Stored, W: Work>(plan: &FramePlan, work: W) -> Result<W::Output, RenderError> {
+fn dispatch_side<S: Stored, W: Work>(plan: &FramePlan, work: W) -> W::Output {
     match plan.field().slots().places() {
-        Places::Even(BrickSide::S16) => Ok(work.run(&Scene::<16, S>::new(plan))),
-        Places::Even(BrickSide::S32) => Ok(work.run(&Scene::<32, S>::new(plan))),
-        Places::Even(BrickSide::S64) => Ok(work.run(&Scene::<64, S>::new(plan))),
-        Places::Table { .. } => Err(RenderError::Unsupported { what: "draw slots of several sizes" }),
+        Places::Even(BrickSide::S16) => work.run(&F32Plan::<16, S>::new(plan)),
+        Places::Even(BrickSide::S32) => work.run(&F32Plan::<32, S>::new(plan)),
+        Places::Even(BrickSide::S64) => work.run(&F32Plan::<64, S>::new(plan)),
+        Places::Table { .. } => work.run(&PlacedPlan::<S>::new(plan)),
     }
 }
 
@@ -122,13 +159,13 @@ struct Rendering;
 
 impl Work for Rendering {
     type Output = Image<f32>;
-    fn run<const N: usize, S: Stored>(self, scene: &Scene<N, S>) -> Image<f32> {
-        let size = scene.plan.size();
+    fn run(self, renderer: &impl Renderer) -> Image<f32> {
+        let size = renderer.plan().size();
         let mut image = Image::transparent(size);
         let width = size.x.max(1) as usize;
         let simd = pulp::Arch::new();
         let bands = image.pixels_mut().par_chunks_mut(width * TILE).enumerate();
-        bands.for_each(|(band, pixels)| simd.dispatch(Band { scene, first_row: band * TILE, width, pixels }));
+        bands.for_each(|(band, pixels)| simd.dispatch(Band { renderer, first_row: band * TILE, width, pixels }));
         image
     }
 }
@@ -136,22 +173,22 @@ impl Work for Rendering {
 /// Pixels along a tile's side: neighbouring rays read the same samples while they are in the cache. Beams have no smaller ones.
 const TILE: usize = 8;
 /// All segments of a ray.
-const ALL: std::ops::Range<i64> = i64::MIN..i64::MAX;
+const ALL: Range<i64> = i64::MIN..i64::MAX;
 
 /// [`TILE`] rows of the picture: all that is inlined below it is compiled once for each instruction set.
-struct Band<'a, const N: usize, S> {
-    scene: &'a Scene<'a, N, S>,
+struct Band<'a, R> {
+    renderer: &'a R,
     first_row: usize,
     width: usize,
     pixels: &'a mut [[f32; 4]],
 }
 
-impl<const N: usize, S: Stored> pulp::NullaryFnOnce for Band<'_, N, S> {
+impl<R: Renderer> pulp::NullaryFnOnce for Band<'_, R> {
     type Output = ();
     #[inline(always)]
     fn call(self) {
         let n_rows = self.pixels.len() / self.width;
-        let plan = self.scene.plan;
+        let plan = self.renderer.plan();
         for tile in (0..self.width).step_by(TILE) {
             let columns = tile..(tile + TILE).min(self.width);
             let corner = UVec2::new(tile as u32, self.first_row as u32);
@@ -161,7 +198,7 @@ impl<const N: usize, S: Stored> pulp::NullaryFnOnce for Band<'_, N, S> {
             }
             for (y, x) in (0..n_rows).flat_map(|y| columns.clone().map(move |x| (y, x))) {
                 let ray = plan.rays().ray(x as u32, (self.first_row + y) as u32);
-                self.pixels[y * self.width + x] = march::march(self.scene, &ray, runs);
+                self.pixels[y * self.width + x] = self.renderer.pixel(&ray, runs);
             }
         }
     }
@@ -174,17 +211,13 @@ struct Evaluation<'a> {
 
 impl Work for Evaluation<'_> {
     type Output = Vec<[f32; 4]>;
-    fn run<const N: usize, S: Stored>(self, scene: &Scene<N, S>) -> Vec<[f32; 4]> {
-        self.inputs.iter().map(|input| evaluate(scene, self.function, *input)).collect()
+    fn run(self, renderer: &impl Renderer) -> Vec<[f32; 4]> {
+        self.inputs.iter().map(|input| evaluate(renderer, self.function, *input)).collect()
     }
 }
 
-fn evaluate<const N: usize, S: Stored>(
-    scene: &Scene<N, S>,
-    function: ShaderFunction,
-    [x, y, z, _]: [f32; 4],
-) -> [f32; 4] {
-    let transfer = &scene.transfer;
+fn evaluate(renderer: &impl Renderer, function: ShaderFunction, [x, y, z, _]: [f32; 4]) -> [f32; 4] {
+    let (plan, transfer) = (renderer.plan(), renderer.transfer());
     let values = transfer.values;
     let relative = |v: f32| values.number(v.into()) as f32;
     match function {
@@ -195,21 +228,21 @@ fn evaluate<const N: usize, S: Stored>(
             [o.color[0], o.color[1], o.color[2], o.extinction]
         }
         ShaderFunction::Segment => {
-            let rule = scene.plan.sampling().rule();
+            let rule = plan.sampling().rule();
             let s = segment::segment(rule, transfer, [Some(relative(x)), Some(relative(y))], z);
             [s.emission[0], s.emission[1], s.emission[2], s.depth]
         }
         ShaderFunction::Sample => {
-            let value = scene.value(DVec3::new(x.into(), y.into(), z.into()));
+            let value = renderer.value(DVec3::new(x.into(), y.into(), z.into()));
             value.map_or([0.0; 4], |v| [values.value(v.into()) as f32, 1.0, 0.0, 0.0])
         }
         ShaderFunction::RayAnchor => {
-            let ray = scene.plan.rays().ray(x as u32, y as u32);
+            let ray = plan.rays().ray(x as u32, y as u32);
             let a = ray.anchor.as_vec3();
             [a.x, a.y, a.z, ray.t_anchor as f32]
         }
         ShaderFunction::RayDirection => {
-            let d = scene.plan.rays().ray(x as u32, y as u32).direction.as_vec3();
+            let d = plan.rays().ray(x as u32, y as u32).direction.as_vec3();
             [d.x, d.y, d.z, 0.0]
         }
     }

@@ -21,10 +21,10 @@ struct Stack {
     offset: f64,
     owner: u32,
     /// The part of the picture, or of space, whose rays meet these planes.
-    part: Part,
+    part: PlanePart,
 }
 
-enum Part {
+enum PlanePart {
     All,
     /// A triangle of the picture.
     Facet([DVec2; 3]),
@@ -78,14 +78,14 @@ fn exits(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Outline> 
 fn stacks(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Stack> {
     match plan.rays.placement {
         Placement::Shells => Vec::new(),
-        Placement::ViewportPlanes => vec![picture_plane(plan, projector, DVec3::Z, 0, Part::All)],
+        Placement::ViewportPlanes => vec![picture_plane(plan, projector, DVec3::Z, 0, PlanePart::All)],
         Placement::TessellatedShells { .. } => facets_over(plan, projector, b),
         Placement::ObjectPlanes => object_stacks(plan, projector),
     }
 }
 
 /// Planes of a normal in the camera's axes (right, down, forward).
-fn picture_plane(plan: &FramePlan, projector: &Projector<'_>, normal: DVec3, owner: u32, part: Part) -> Stack {
+fn picture_plane(plan: &FramePlan, projector: &Projector<'_>, normal: DVec3, owner: u32, part: PlanePart) -> Stack {
     let scaled = DVec3::new(normal.x * plan.rays.pixel, normal.y * plan.rays.pixel, normal.z);
     let gradient = (0..3).map(|axis| projector.gradient(axis) * scaled[axis]).sum();
     let at_centre = scaled.dot(projector.camera(DVec3::ZERO));
@@ -107,7 +107,7 @@ fn facets_over(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Sta
     let (low, high) = (square(low), square(high));
     let squares = (low.y..=high.y).flat_map(|y| (low.x..=high.x).map(move |x| (x, y)));
     let facets = squares.flat_map(|(x, y)| [0, 1].map(|half| 2 * (x + y * rays.facet_squares().x) + half));
-    let stack = |f| picture_plane(plan, projector, rays.facet_normal(f), f, Part::Facet(rays.facet_corners(f)));
+    let stack = |f| picture_plane(plan, projector, rays.facet_normal(f), f, PlanePart::Facet(rays.facet_corners(f)));
     facets.map(stack).collect()
 }
 
@@ -123,10 +123,10 @@ fn object_stacks(plan: &FramePlan, projector: &Projector<'_>) -> Vec<Stack> {
     match projector.eye() {
         None => {
             let axis = planes.axis(plan.rays.direction[0]);
-            vec![stack(axis, plan.rays.direction[0][axis] > 0.0, Part::All)]
+            vec![stack(axis, plan.rays.direction[0][axis] > 0.0, PlanePart::All)]
         }
         Some(eye) => {
-            let both = |axis| [true, false].map(|up| stack(axis, up, Part::Pyramid { axis, eye }));
+            let both = |axis| [true, false].map(|up| stack(axis, up, PlanePart::Pyramid { axis, eye }));
             (0..3).flat_map(both).collect()
         }
     }
@@ -159,11 +159,11 @@ impl Stack {
     fn seen(&self, plan: &FramePlan, projector: &Projector<'_>, b: &Aabb, level: f64) -> Vec<DVec2> {
         let polygon = slice(b, Plane { gradient: self.gradient, level: level - self.offset });
         let polygon = match self.part {
-            Part::Pyramid { axis, eye } => in_pyramid(plan, polygon, axis, eye, projector.rounding()),
+            PlanePart::Pyramid { axis, eye } => in_pyramid(plan, polygon, axis, eye, projector.rounding()),
             _ => polygon,
         };
         match self.part {
-            Part::Facet(triangle) => {
+            PlanePart::Facet(triangle) => {
                 in_triangle(projector.project(&polygon, projector.window().around(triangle)), triangle)
             }
             _ => projector.project(&polygon, projector.window()),
@@ -171,10 +171,10 @@ impl Stack {
     }
 }
 
-impl Part {
+impl PlanePart {
     /// The part of a box that lies on the stack's side of the eye.
     fn bounds(&self, b: &Aabb, gradient: DVec3) -> Aabb {
-        let Part::Pyramid { axis, eye } = *self else { return *b };
+        let PlanePart::Pyramid { axis, eye } = *self else { return *b };
         let mut bounds = *b;
         if gradient[axis] > 0.0 {
             bounds.min[axis] = bounds.min[axis].max(eye[axis]);

@@ -29,7 +29,7 @@ const SEQUENCE_END: (u16, u16) = (0xfffe, 0xe0dd);
 const PIXEL_DATA: (u16, u16) = (0x7fe0, 0x0010);
 
 /// One element's header.
-struct Header {
+struct ElementHeader {
     tag: (u16, u16),
     length: u32,
     vr: VR,
@@ -118,7 +118,7 @@ struct Nest {
 }
 
 impl Nest {
-    fn enter(&mut self, header: &Header, n_left: u64) -> Result<(), ReadError> {
+    fn enter(&mut self, header: &ElementHeader, n_left: u64) -> Result<(), ReadError> {
         let end = (header.length != UNDEFINED).then(|| n_left - u64::from(header.length));
         self.ends.push(end);
         match self.ends.len() <= MAX_DEPTH {
@@ -142,7 +142,7 @@ impl Nest {
     }
 }
 
-fn check_element_length(header: &Header, n_left: u64) -> Result<(), ReadError> {
+fn check_element_length(header: &ElementHeader, n_left: u64) -> Result<(), ReadError> {
     let value_bytes = value_bytes(header.vr);
     let expected = if u64::from(header.length) > n_left {
         format!("at most the {} left", bytes(n_left))
@@ -160,7 +160,7 @@ fn skip(source: &mut dyn ByteSource, n_bytes: u64) -> Result<(), ReadError> {
 }
 
 /// The next header and its length, or nothing where the source ends.
-fn read_header(source: &mut dyn ByteSource, syntax: Syntax) -> Result<Option<(Header, u64)>, ReadError> {
+fn read_header(source: &mut dyn ByteSource, syntax: Syntax) -> Result<Option<(ElementHeader, u64)>, ReadError> {
     let mut bytes = [0; 8];
     if fill(source, &mut bytes).map_err(|e| ReadError::io("the data set", e))? < 8 {
         return Ok(None);
@@ -176,21 +176,21 @@ fn read_header(source: &mut dyn ByteSource, syntax: Syntax) -> Result<Option<(He
         _ => u32::from_le_bytes(x),
     };
     if tag.0 == ITEM.0 {
-        return Ok(Some((Header { tag, length: long([e, f, g, h]), vr: VR::UN }, 8)));
+        return Ok(Some((ElementHeader { tag, length: long([e, f, g, h]), vr: VR::UN }, 8)));
     }
     if syntax == Syntax::Implicit {
         let length = long([e, f, g, h]);
-        return Ok(Some((Header { tag, length, vr: standard_vr(tag) }, 8)));
+        return Ok(Some((ElementHeader { tag, length, vr: standard_vr(tag) }, 8)));
     }
     let vr = VR::from_binary([e, f]).unwrap_or(VR::UN);
     if has_short_form([e, f]) {
-        return Ok(Some((Header { tag, length: u32::from(short(g, h)), vr }, 8)));
+        return Ok(Some((ElementHeader { tag, length: u32::from(short(g, h)), vr }, 8)));
     }
     let mut length = [0; 4];
     if fill(source, &mut length).map_err(|e| ReadError::io("the data set", e))? < 4 {
         return Ok(None);
     }
-    Ok(Some((Header { tag, length: long(length), vr }, 12)))
+    Ok(Some((ElementHeader { tag, length: long(length), vr }, 12)))
 }
 
 /// Value representations whose length has 16 bits (PS3.5, 7.1.2). Unknown ones have the long form, as the parser has it.
@@ -241,7 +241,7 @@ pub(super) fn read_transfer_syntax(source: &mut dyn ByteSource) -> Result<String
 fn read_group_length(source: &mut dyn ByteSource) -> Result<u64, ReadError> {
     let mut value = [0; 4];
     match read_header(source, Syntax::ExplicitLittle)? {
-        Some((Header { tag: (2, 0), length: 4, .. }, _)) => {}
+        Some((ElementHeader { tag: (2, 0), length: 4, .. }, _)) => {}
         _ => return Err(ReadError::Missing { field: "FileMetaInformationGroupLength" }),
     }
     let n = fill(source, &mut value).map_err(|e| ReadError::io("the file meta group", e))?;

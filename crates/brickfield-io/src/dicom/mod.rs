@@ -12,8 +12,8 @@ mod slice;
 mod stack;
 
 use crate::guard::guarded;
-use crate::limits::Shape;
-use crate::opened::Found;
+use crate::limits::CheckedShape;
+use crate::opened::FileFacts;
 use crate::{DataFiles, Format, Limits, Note, Opened, ReadError, WorldFrame};
 use slice::Slice;
 
@@ -27,13 +27,13 @@ use slice::Slice;
 /// What [`ReadError`] lists. In a folder, files that are no slices are skipped with a note; if none is left, the first
 /// one's error is returned.
 pub fn read(names: &[String], files: &dyn DataFiles, limits: &Limits) -> Result<Opened, ReadError> {
-    let mut found = Found::plain(Format::Dicom);
+    let mut found = FileFacts::plain(Format::Dicom);
     let slices = read_headers(names, files, &mut found.notes)?;
     let slices = stack::largest_series(slices, &mut found.notes);
     let slices = stack::sorted(slices, &mut found.notes);
     let first = slices.first().ok_or(ReadError::Missing { field: "a slice" })?;
     let dims = [first.columns, first.rows, slices.len() as u64];
-    let shape = Shape::claim(dims, first.scalar, limits)?;
+    let shape = CheckedShape::claim(dims, first.scalar, limits)?;
     let (placement, frame) = stack::placement(&slices, &mut found.notes);
     let grid = placement.grid(shape.dims)?;
     if first.low_is_bright {

@@ -5,18 +5,18 @@ use dicom_dictionary_std::tags;
 use dicom_object::DefaultDicomObject;
 use dicom_pixeldata::PixelDecoder;
 
-use super::slice::{Bits, Part, Slice, read_object};
+use super::slice::{Bits, ReadExtent, Slice, read_object};
 use crate::error::bytes;
 use crate::error::check_length;
 use crate::files::{DataFiles, open_named};
 use crate::guard::guarded;
-use crate::limits::{Limits, Shape, check_bytes};
+use crate::limits::{CheckedShape, Limits, check_bytes};
 use crate::rescale::{Rescale, rescaled_type};
 use crate::samples::{allocate, append_binary, with_room};
 use crate::{ByteOrder, Note, ReadError};
 
 /// The stored values of all slices, in the type that the first one has.
-pub(super) fn read_stored(slices: &[Slice], shape: &Shape, files: &dyn DataFiles) -> Result<Voxels, ReadError> {
+pub(super) fn read_stored(slices: &[Slice], shape: &CheckedShape, files: &dyn DataFiles) -> Result<Voxels, ReadError> {
     let mut voxels = allocate(shape)?;
     for slice in slices {
         let bytes = guarded("DICOM pixel", || decode(slice, files))?;
@@ -27,7 +27,7 @@ pub(super) fn read_stored(slices: &[Slice], shape: &Shape, files: &dyn DataFiles
 }
 
 fn decode(slice: &Slice, files: &dyn DataFiles) -> Result<Vec<u8>, ReadError> {
-    let object = read_object(&mut *open_named(files, &slice.name)?, Part::WithPixels)?;
+    let object = read_object(&mut *open_named(files, &slice.name)?, ReadExtent::WithPixels)?;
     check_fragments(&object, slice)?;
     let expected_bytes = slice.n_samples() as u128 * u128::from(slice.bits.n_allocated / 8);
     let what = || format!("the pixels of {:?}, {} promised", slice.name, bytes(expected_bytes));

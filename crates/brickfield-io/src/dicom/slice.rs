@@ -45,7 +45,7 @@ pub(super) struct Bits {
 impl Slice {
     pub(super) fn read(name: &str, files: &dyn DataFiles) -> Result<Slice, ReadError> {
         let mut source = open_named(files, name)?;
-        let object = read_object(&mut *source, Part::BeforePixels)?;
+        let object = read_object(&mut *source, ReadExtent::BeforePixels)?;
         let attributes = Attributes { object: &object };
         attributes.check_supported()?;
         let bits = attributes.bits()?;
@@ -79,13 +79,13 @@ impl Slice {
 
 /// How much of a data set is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Part {
+pub(super) enum ReadExtent {
     BeforePixels,
     WithPixels,
 }
 
 /// Parses a file, once all its lengths are known to lie within it.
-pub(super) fn read_object(source: &mut dyn ByteSource, part: Part) -> Result<DefaultDicomObject, ReadError> {
+pub(super) fn read_object(source: &mut dyn ByteSource, part: ReadExtent) -> Result<DefaultDicomObject, ReadError> {
     if n_bytes_left(source)? == 0 {
         return Err(ReadError::Empty);
     }
@@ -98,8 +98,8 @@ pub(super) fn read_object(source: &mut dyn ByteSource, part: Part) -> Result<Def
     source.seek(SeekFrom::Start(0)).map_err(|e| ReadError::io("the data set", e))?;
     let options = OpenFileOptions::new().read_preamble(ReadPreamble::Always);
     let options = match part {
-        Part::BeforePixels => options.read_until(tags::PIXEL_DATA),
-        Part::WithPixels => options.read_to(tags::PIXEL_DATA),
+        ReadExtent::BeforePixels => options.read_until(tags::PIXEL_DATA),
+        ReadExtent::WithPixels => options.read_to(tags::PIXEL_DATA),
     };
     options.from_reader(source.take(end)).map_err(|e| ReadError::decoder("the data set", e))
 }

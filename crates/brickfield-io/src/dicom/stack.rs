@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use brickfield_core::glam::DVec3;
 
 use super::slice::Slice;
-use crate::placement::Placement;
+use crate::placement::GridPlacement;
 use crate::{Note, WorldFrame};
 
 /// The largest set of slices of one series that have one size, type and orientation.
@@ -56,7 +56,7 @@ fn normal(slices: &[Slice]) -> Option<DVec3> {
 }
 
 /// Where the sorted slices lie.
-pub(super) fn placement(slices: &[Slice], notes: &mut Vec<Note>) -> (Placement, WorldFrame) {
+pub(super) fn placement(slices: &[Slice], notes: &mut Vec<Note>) -> (GridPlacement, WorldFrame) {
     let first = &slices[0];
     let [dx, dy] = first.pixel_spacing.unwrap_or_else(|| {
         notes.extend(['x', 'y'].map(|axis| Note::SpacingAssumed { axis, reason: "is not stated" }));
@@ -65,14 +65,14 @@ pub(super) fn placement(slices: &[Slice], notes: &mut Vec<Note>) -> (Placement, 
     let (Some(normal), Some([along_row, along_column])) = (normal(slices), first.orientation) else {
         notes.push(Note::OrientationIgnored { what: "position or orientation is missing in some slices" });
         let spacing = DVec3::new(dx, dy, stated_step(first, notes));
-        return (Placement::axis_aligned(spacing, DVec3::ZERO), WorldFrame::Plain);
+        return (GridPlacement::axis_aligned(spacing, DVec3::ZERO), WorldFrame::Plain);
     };
     let positions: Vec<DVec3> = slices.iter().filter_map(|s| s.position).collect();
     let step = match positions.len() {
         1 => normal * stated_step(first, notes),
         _ => step_through(&positions, normal, notes),
     };
-    let placement = Placement::from_axes(&[along_row * dx, along_column * dy, step], positions[0]);
+    let placement = GridPlacement::from_axes(&[along_row * dx, along_column * dy, step], positions[0]);
     (placement, WorldFrame::Lps)
 }
 

@@ -8,11 +8,11 @@ use crate::error::{Shown, counted};
 use crate::file_list::FileNames;
 use crate::files::ByteSource;
 use crate::lines::{HeaderLines, numbers};
-use crate::stored::{ByteSkip, Encoding, Stored};
+use crate::stored::{ByteSkip, Encoding, StoredSamples};
 use crate::{ByteOrder, Format, ReadError};
 
 /// Field names are in lower case and without spaces, so that "data file" and "datafile" are one.
-pub(super) struct Header {
+pub(super) struct NrrdHeader {
     fields: BTreeMap<String, String>,
     data_files: Vec<String>,
     /// Samples along each axis of the file, fastest first.
@@ -21,12 +21,12 @@ pub(super) struct Header {
 
 const MAX_AXES: usize = 16;
 
-impl Header {
+impl NrrdHeader {
     /// Reads the header; the source is then at the first byte of attached data.
-    pub(super) fn read(source: &mut dyn ByteSource) -> Result<Header, ReadError> {
+    pub(super) fn read(source: &mut dyn ByteSource) -> Result<NrrdHeader, ReadError> {
         let mut lines = HeaderLines::new(source);
         check_magic(&lines.next_line()?.unwrap_or_default())?;
-        let mut header = Header { fields: BTreeMap::new(), data_files: Vec::new(), sizes: Vec::new() };
+        let mut header = NrrdHeader { fields: BTreeMap::new(), data_files: Vec::new(), sizes: Vec::new() };
         while let Some(line) = lines.next_line()? {
             if line.is_empty() {
                 break;
@@ -101,7 +101,7 @@ impl Header {
         })
     }
 
-    pub(super) fn stored(&self, scalar: ScalarType) -> Result<Stored, ReadError> {
+    pub(super) fn stored(&self, scalar: ScalarType) -> Result<StoredSamples, ReadError> {
         let encoding = self.encoding()?;
         let order = match self.text("endian").map(str::to_ascii_lowercase).as_deref() {
             Some("little") => ByteOrder::Little,
@@ -110,7 +110,7 @@ impl Header {
             None if scalar.n_bytes() == 1 || encoding == Encoding::Text => ByteOrder::Little,
             None => return Err(ReadError::Missing { field: "endian" }),
         };
-        Ok(Stored { encoding, order, line_skip: self.line_skip()?, byte_skip: self.byte_skip()? })
+        Ok(StoredSamples { encoding, order, line_skip: self.line_skip()?, byte_skip: self.byte_skip()? })
     }
 
     fn encoding(&self) -> Result<Encoding, ReadError> {

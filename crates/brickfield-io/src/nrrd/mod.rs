@@ -13,12 +13,12 @@ use std::io::{BufRead, Seek};
 
 use crate::detached::read_detached;
 use crate::files::ByteSource;
-use crate::limits::Shape;
-use crate::opened::Found;
+use crate::limits::CheckedShape;
+use crate::opened::FileFacts;
 use crate::samples::allocate;
-use crate::stored::Part;
+use crate::stored::DataFile;
 use crate::{DataFiles, Format, Limits, Opened, ReadError};
-use header::Header;
+use header::NrrdHeader;
 use space::Space;
 
 /// Reads an NRRD from its header on; `files` finds detached data.
@@ -33,18 +33,18 @@ pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, limits: &Limi
 }
 
 fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, limits: &Limits) -> Result<Opened, ReadError> {
-    let header = Header::read(source)?;
+    let header = NrrdHeader::read(source)?;
     let scalar = header.scalar()?;
     let stored = header.stored(scalar)?;
-    let mut found = Found::plain(Format::Nrrd);
+    let mut found = FileFacts::plain(Format::Nrrd);
     let space = Space::of(&header, &mut found.notes)?;
-    let shape = Shape::claim(space.dims, scalar, limits)?;
+    let shape = CheckedShape::claim(space.dims, scalar, limits)?;
     let grid = space.placement.grid(shape.dims)?;
     let voxels = match header.file_names()? {
         Some(names) => read_detached(&names, header.n_samples(), &shape, &stored, files, &mut found.notes)?,
         None => {
             let n_wanted = shape.n_voxels();
-            let part = Part { name: "the data after the header", n_samples: header.n_samples(), n_wanted };
+            let part = DataFile { name: "the data after the header", n_samples: header.n_samples(), n_wanted };
             stored.seek_samples(source, &part, scalar.n_bytes())?;
             let mut voxels = allocate(&shape)?;
             stored.append(&mut voxels, source, &part, &mut found.notes)?;

@@ -2,21 +2,21 @@
 
 use brickfield_core::glam::DVec3;
 
-use super::header::Header;
+use super::header::NrrdHeader;
 use crate::error::counted;
-use crate::placement::{AXES, Placement, usable_spacing};
+use crate::placement::{AXES, GridPlacement, usable_spacing};
 use crate::{Note, ReadError, WorldFrame};
 
 /// Which axes of the file are the volume's, and where they lie in the world.
 pub(super) struct Space {
     pub(super) dims: [u64; 3],
-    pub(super) placement: Placement,
+    pub(super) placement: GridPlacement,
     pub(super) frame: WorldFrame,
     pub(super) unit: Option<String>,
 }
 
 impl Space {
-    pub(super) fn of(header: &Header, notes: &mut Vec<Note>) -> Result<Space, ReadError> {
+    pub(super) fn of(header: &NrrdHeader, notes: &mut Vec<Note>) -> Result<Space, ReadError> {
         let directions = directions(header)?;
         let axes = volume_axes(header, &directions, notes)?;
         let mut dims = [1; 3];
@@ -35,7 +35,7 @@ impl Space {
 /// One vector per axis, or none for an axis outside space.
 type Directions = Vec<Option<DVec3>>;
 
-fn directions(header: &Header) -> Result<Option<Directions>, ReadError> {
+fn directions(header: &NrrdHeader) -> Result<Option<Directions>, ReadError> {
     let Some(text) = header.text("spacedirections") else { return Ok(None) };
     let vectors = vectors("space directions", text)?;
     if vectors.len() != header.sizes.len() {
@@ -69,7 +69,7 @@ fn vectors(field: &'static str, text: &str) -> Result<Directions, ReadError> {
 
 /// The up to three axes that make the volume. Of slower ones the first entry is taken; faster ones are an error.
 fn volume_axes(
-    header: &Header,
+    header: &NrrdHeader,
     directions: &Option<Directions>,
     notes: &mut Vec<Note>,
 ) -> Result<Vec<usize>, ReadError> {
@@ -93,7 +93,7 @@ fn volume_axes(
 }
 
 fn check_left_out(
-    header: &Header,
+    header: &NrrdHeader,
     axis: usize,
     volume_axes: &[usize],
     kinds: &[&str],
@@ -113,7 +113,7 @@ fn check_left_out(
 }
 
 /// The frame, and the factors that bring the file's axes to it.
-fn frame_of(header: &Header) -> (WorldFrame, DVec3) {
+fn frame_of(header: &NrrdHeader) -> (WorldFrame, DVec3) {
     let space = header.text("space").unwrap_or("").to_ascii_lowercase();
     let factors = match space.trim_end_matches("-time").trim_end_matches('t') {
         "left-posterior-superior" | "lps" => DVec3::ONE,
@@ -124,7 +124,7 @@ fn frame_of(header: &Header) -> (WorldFrame, DVec3) {
     (WorldFrame::Lps, factors)
 }
 
-fn oriented(header: &Header, directions: &Directions, axes: &[usize]) -> Result<Placement, ReadError> {
+fn oriented(header: &NrrdHeader, directions: &Directions, axes: &[usize]) -> Result<GridPlacement, ReadError> {
     let origin = match header.text("spaceorigin") {
         None => DVec3::ZERO,
         Some(text) => match vectors("space origin", text)?.as_slice() {
@@ -134,11 +134,11 @@ fn oriented(header: &Header, directions: &Directions, axes: &[usize]) -> Result<
         },
     };
     let steps: Vec<DVec3> = axes.iter().filter_map(|axis| directions[*axis]).collect();
-    Ok(Placement::from_axes(&steps, origin))
+    Ok(GridPlacement::from_axes(&steps, origin))
 }
 
 /// Without directions: spacings, axis mins and axis maxs, each with NaN for "unknown".
-fn by_spacings(header: &Header, axes: &[usize], notes: &mut Vec<Note>) -> Result<Placement, ReadError> {
+fn by_spacings(header: &NrrdHeader, axes: &[usize], notes: &mut Vec<Note>) -> Result<GridPlacement, ReadError> {
     let spacings = per_axis(header, "spacings", "spacings")?;
     let mins = per_axis(header, "axismins", "axis mins")?;
     let maxs = per_axis(header, "axismaxs", "axis maxs")?;
@@ -155,10 +155,10 @@ fn by_spacings(header: &Header, axes: &[usize], notes: &mut Vec<Note>) -> Result
         let to_centre = if is_node { 0.0 } else { 0.5 * spacing[i] };
         first_sample[i] = at(&mins).filter(|m| m.is_finite()).map_or(0.0, |m| m + to_centre);
     }
-    Ok(Placement::axis_aligned(spacing, first_sample))
+    Ok(GridPlacement::axis_aligned(spacing, first_sample))
 }
 
-fn per_axis(header: &Header, name: &str, field: &'static str) -> Result<Option<Vec<f64>>, ReadError> {
+fn per_axis(header: &NrrdHeader, name: &str, field: &'static str) -> Result<Option<Vec<f64>>, ReadError> {
     let Some(text) = header.text(name) else { return Ok(None) };
     let values = crate::lines::numbers::<f64>(field, text)?;
     if values.len() != header.sizes.len() {
@@ -172,7 +172,7 @@ fn per_axis(header: &Header, name: &str, field: &'static str) -> Result<Option<V
 }
 
 /// The first unit that a volume axis states, without its quotes.
-fn unit(header: &Header, axes: &[usize]) -> Option<String> {
+fn unit(header: &NrrdHeader, axes: &[usize]) -> Option<String> {
     let quoted = |text: &str, i: usize| text.split('"').nth(2 * i + 1).map(str::trim).map(str::to_owned);
     let unit = match header.text("spaceunits") {
         Some(text) => quoted(text, 0),

@@ -7,8 +7,8 @@ use zarrs::storage::{ReadableStorage, ReadableStorageTraits};
 use super::image::VolumeAxes;
 use super::metadata::ArrayMetadata;
 use crate::error::bytes;
-use crate::limits::Shape;
-use crate::samples::{Sample, with_room};
+use crate::limits::CheckedShape;
+use crate::samples::{FileScalar, with_room};
 use crate::{Note, ReadError};
 
 /// Reads all chunks that hold the first entry of every other axis; notes that some are not stored.
@@ -17,7 +17,7 @@ pub(super) fn read(
     path: &str,
     metadata: &ArrayMetadata,
     volume_axes: VolumeAxes,
-    shape: &Shape,
+    shape: &CheckedShape,
 ) -> Result<(Voxels, Option<Note>), ReadError> {
     let array = Array::new_with_metadata(store.clone(), path, metadata.for_zarrs()?);
     let array = array.map_err(|e| ReadError::decoder("the array", e))?;
@@ -48,7 +48,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn read<T: Sample + ElementOwned>(&mut self) -> Result<Voxels, ReadError> {
+    fn read<T: FileScalar + ElementOwned>(&mut self) -> Result<Voxels, ReadError> {
         let fill = self.fill_value::<T>()?;
         let n = self.dims.iter().product::<u64>() as usize;
         let mut values = with_room::<T>(n)?;
@@ -67,7 +67,7 @@ impl Reader<'_> {
         Ok(Scalar::wrap(values))
     }
 
-    fn fill_value<T: Sample>(&self) -> Result<T, ReadError> {
+    fn fill_value<T: FileScalar>(&self) -> Result<T, ReadError> {
         let bytes = self.array.fill_value().as_ne_bytes();
         let native = if cfg!(target_endian = "big") { crate::ByteOrder::Big } else { crate::ByteOrder::Little };
         let mut values = Vec::new();
@@ -81,7 +81,7 @@ impl Reader<'_> {
     }
 
     /// Whether the chunk is stored.
-    fn read_chunk<T: Sample + ElementOwned>(
+    fn read_chunk<T: FileScalar + ElementOwned>(
         &self,
         at: [u64; 3],
         chunk: [u64; 3],

@@ -6,11 +6,11 @@ use zarrs::storage::ReadableStorage;
 
 use super::json::read_json;
 use crate::error::counted;
-use crate::placement::Placement;
+use crate::placement::GridPlacement;
 use crate::{Note, ReadError};
 
 /// The finest level of one image.
-pub(super) struct Image {
+pub(super) struct ZarrImage {
     /// Path of the array in the store, with a slash in front.
     pub(super) path: String,
     axes: Vec<Axis>,
@@ -27,8 +27,8 @@ struct Axis {
 /// Which array axis is x, y, z; none where the array is flat.
 pub(super) type VolumeAxes = [Option<usize>; 3];
 
-impl Image {
-    pub(super) fn read(store: &ReadableStorage, notes: &mut Vec<Note>) -> Result<Image, ReadError> {
+impl ZarrImage {
+    pub(super) fn read(store: &ReadableStorage, notes: &mut Vec<Note>) -> Result<ZarrImage, ReadError> {
         let (prefix, multiscales) = find_multiscales(store)?;
         if multiscales.len() > 1 {
             notes.push(Note::SeveralArrays { kept: "the first image".to_owned(), n_arrays: multiscales.len() });
@@ -42,7 +42,7 @@ impl Image {
             return Err(ReadError::field("number of axes", axes.len(), format!("1 to {MAX_AXES}")));
         }
         let (scale, translation) = (vec![1.0; axes.len()], vec![0.0; axes.len()]);
-        let mut image = Image { path: format!("{prefix}/{path}"), axes, scale, translation };
+        let mut image = ZarrImage { path: format!("{prefix}/{path}"), axes, scale, translation };
         image.transform(&dataset["coordinateTransformations"])?;
         image.transform(&multiscale["coordinateTransformations"])?;
         Ok(image)
@@ -105,10 +105,10 @@ impl Image {
         Ok(volume_axes)
     }
 
-    pub(super) fn placement(&self, volume_axes: VolumeAxes) -> Placement {
+    pub(super) fn placement(&self, volume_axes: VolumeAxes) -> GridPlacement {
         let scale = volume_axes.map(|axis| axis.map_or(1.0, |a| self.scale[a]));
         let translation = volume_axes.map(|axis| axis.map_or(0.0, |a| self.translation[a]));
-        Placement::axis_aligned(DVec3::from(scale), DVec3::from(translation))
+        GridPlacement::axis_aligned(DVec3::from(scale), DVec3::from(translation))
     }
 
     pub(super) fn unit(&self, volume_axes: VolumeAxes) -> Option<String> {

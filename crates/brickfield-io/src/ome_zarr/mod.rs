@@ -18,10 +18,10 @@ use zarrs::storage::store::MemoryStore;
 use zarrs::storage::{ReadableStorage, StoreKey, WritableStorageTraits};
 
 use crate::guard::guarded;
-use crate::limits::Shape;
-use crate::opened::Found;
+use crate::limits::CheckedShape;
+use crate::opened::FileFacts;
 use crate::{Format, Limits, Opened, ReadError};
-use image::Image;
+use image::ZarrImage;
 use metadata::ArrayMetadata;
 
 /// Reads an OME-Zarr folder.
@@ -50,12 +50,12 @@ pub fn read_entries(entries: &BTreeMap<String, Vec<u8>>, limits: &Limits) -> Res
 }
 
 fn read_store(store: ReadableStorage, limits: &Limits) -> Result<Opened, ReadError> {
-    let mut found = Found::pictures(Format::OmeZarr);
-    let image = Image::read(&store, &mut found.notes)?;
+    let mut found = FileFacts::pictures(Format::OmeZarr);
+    let image = ZarrImage::read(&store, &mut found.notes)?;
     let array = ArrayMetadata::read(&store, &image.path)?;
     let volume_axes = image.volume_axes(&array.shape, &mut found.notes)?;
     let dims = volume_axes.map(|axis| axis.map_or(1, |axis| array.shape[axis]));
-    let shape = Shape::claim(dims, array.scalar, limits)?;
+    let shape = CheckedShape::claim(dims, array.scalar, limits)?;
     let grid = image.placement(volume_axes).grid(shape.dims)?;
     array.check_chunks(limits)?;
     let (voxels, note) = guarded("Zarr", || chunks::read(&store, &image.path, &array, volume_axes, &shape))?;

@@ -18,12 +18,12 @@ use brickfield_core::{ScalarType, Voxels};
 use crate::files::{ByteSource, n_bytes_left, read_head};
 use crate::format::is_tiff;
 use crate::guard::guarded;
-use crate::limits::{Shape, check_bytes};
-use crate::opened::Found;
-use crate::placement::Placement;
+use crate::limits::{CheckedShape, check_bytes};
+use crate::opened::FileFacts;
+use crate::placement::GridPlacement;
 use crate::samples::allocate;
 use crate::{Format, Limits, Note, Opened, ReadError};
-use description::Description;
+use description::ImageDescription;
 use fault::PageNames;
 use tags::check_tags;
 
@@ -50,9 +50,9 @@ fn read_from(source: &mut dyn ByteSource, limits: &Limits) -> Result<Opened, Rea
     let mut names = PageNames { n_file_bytes, n_pages: None };
     check_tags(source, &names)?;
     let mut decoder = Decoder::new(source).map_err(|e| names.tags_fault(0, e))?.with_limits(header_limits());
-    let mut found = Found::pictures(Format::Tiff);
+    let mut found = FileFacts::pictures(Format::Tiff);
     let first = Page::read(&mut decoder, 0, &names)?;
-    let description = Description::read(&decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap_or_default());
+    let description = ImageDescription::read(&decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap_or_default());
     let spacing = spacing(&mut decoder, &description);
     first.check_length(n_file_bytes, limits)?;
     names.n_pages = description.order.as_ref().map(|order| order.n_pages());
@@ -63,8 +63,8 @@ fn read_from(source: &mut dyn ByteSource, limits: &Limits) -> Result<Opened, Rea
     }
     let slices = slices(&pages.like_first, &description, &mut found.notes)?;
     let dims = [first.width.into(), first.height.into(), slices.len() as u64];
-    let shape = Shape::claim(dims, first.scalar, limits)?;
-    let grid = Placement::axis_aligned(spacing, 0.5 * spacing).grid(shape.dims)?;
+    let shape = CheckedShape::claim(dims, first.scalar, limits)?;
+    let grid = GridPlacement::axis_aligned(spacing, 0.5 * spacing).grid(shape.dims)?;
     let voxels = read_pages(decoder.with_limits(first.limits(limits)), &slices, &shape, &names)?;
     found.unit = description.unit;
     found.finish(grid, voxels)
@@ -179,7 +179,7 @@ fn list_pages(decoder: &mut PageDecoder, first: &Page, names: &PageNames) -> Res
 }
 
 /// The pages of the first channel and frame.
-fn slices(pages: &[usize], description: &Description, notes: &mut Vec<Note>) -> Result<Vec<usize>, ReadError> {
+fn slices(pages: &[usize], description: &ImageDescription, notes: &mut Vec<Note>) -> Result<Vec<usize>, ReadError> {
     let Some(order) = &description.order else { return Ok(pages.to_vec()) };
     let n_described = order.n_pages();
     if n_described != pages.len() as u64 {
@@ -195,7 +195,7 @@ fn slices(pages: &[usize], description: &Description, notes: &mut Vec<Note>) -> 
     Ok(pages.iter().copied().step_by(step).take(order.n_slices as usize).collect())
 }
 
-fn spacing(decoder: &mut PageDecoder, description: &Description) -> DVec3 {
+fn spacing(decoder: &mut PageDecoder, description: &ImageDescription) -> DVec3 {
     let mut per_pixel = |tag| {
         let pixels_per_unit = resolution(decoder, tag)?;
         description.uses_resolution.then_some(1.0 / pixels_per_unit)
@@ -218,7 +218,7 @@ fn resolution(decoder: &mut PageDecoder, tag: Tag) -> Option<f64> {
 fn read_pages(
     mut decoder: PageDecoder,
     slices: &[usize],
-    shape: &Shape,
+    shape: &CheckedShape,
     names: &PageNames,
 ) -> Result<Voxels, ReadError> {
     let n_page = shape.dims.x as usize * shape.dims.y as usize;

@@ -7,12 +7,12 @@ use crate::ReadError;
 use crate::files::ByteSource;
 
 /// Reads whole numbers in a file's byte order.
-struct Numbers<'a> {
+struct TagNumbers<'a> {
     source: &'a mut dyn ByteSource,
     is_big_endian: bool,
 }
 
-impl Numbers<'_> {
+impl TagNumbers<'_> {
     fn number(&mut self, n_bytes: usize) -> io::Result<u64> {
         let mut bytes = [0; 8];
         self.source.read_exact(&mut bytes[..n_bytes])?;
@@ -57,7 +57,7 @@ impl Directory {
     fn read(&mut self, source: &mut dyn ByteSource) -> io::Result<()> {
         let mut order = [0; 2];
         source.read_exact(&mut order)?;
-        let mut numbers = Numbers { source, is_big_endian: order == *b"MM" };
+        let mut numbers = TagNumbers { source, is_big_endian: order == *b"MM" };
         let is_big = numbers.number(2)? == 43;
         if is_big {
             numbers.number(4)?;

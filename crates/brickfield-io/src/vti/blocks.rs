@@ -8,7 +8,7 @@ use super::document::WordSize;
 use crate::deflate::{Unpacked, check_ratio};
 use crate::error::Damage;
 use crate::error::check_length;
-use crate::limits::Shape;
+use crate::limits::CheckedShape;
 use crate::samples::fill_named;
 use crate::{ByteOrder, ReadError};
 
@@ -47,7 +47,7 @@ impl WordSize {
 /// The header of data that are not compressed: their length.
 ///
 /// A length of 32 bits wraps round in files of 4 GiB and more, which VTK reads all the same.
-pub(super) fn check_plain(words: &mut WordReader, n_left: u64, shape: &Shape) -> Result<(), ReadError> {
+pub(super) fn check_plain(words: &mut WordReader, n_left: u64, shape: &CheckedShape) -> Result<(), ReadError> {
     let stated = words.next()?;
     let expected = match words.size {
         WordSize::Four => shape.n_bytes() & 0xffff_ffff,
@@ -61,7 +61,7 @@ pub(super) fn check_plain(words: &mut WordReader, n_left: u64, shape: &Shape) ->
 }
 
 /// zlib blocks, decoded one after the other.
-pub(super) struct Blocks<'a> {
+pub(super) struct ZlibBlocks<'a> {
     source: &'a mut dyn Read,
     /// Bytes of each block, compressed and not; the last one first.
     sizes: Vec<(u64, u64)>,
@@ -72,7 +72,11 @@ pub(super) struct Blocks<'a> {
 }
 
 /// The header of compressed data: number of blocks, their size, the size of a partial last one, compressed sizes.
-pub(super) fn read_blocks<'a>(mut words: WordReader<'a>, n_left: u64, shape: &Shape) -> Result<Blocks<'a>, ReadError> {
+pub(super) fn read_blocks<'a>(
+    mut words: WordReader<'a>,
+    n_left: u64,
+    shape: &CheckedShape,
+) -> Result<ZlibBlocks<'a>, ReadError> {
     let what = words.what;
     let [n_blocks, block_bytes, partial_bytes] = [words.next()?, words.next()?, words.next()?];
     let n_whole = if partial_bytes > 0 { n_blocks.saturating_sub(1) } else { n_blocks };
@@ -92,10 +96,10 @@ pub(super) fn read_blocks<'a>(mut words: WordReader<'a>, n_left: u64, shape: &Sh
         sizes.push((words.next()?, n));
     }
     sizes.reverse();
-    Ok(Blocks { source: words.reader, sizes, block: Vec::new(), n_given: 0, fault: None })
+    Ok(ZlibBlocks { source: words.reader, sizes, block: Vec::new(), n_given: 0, fault: None })
 }
 
-impl Blocks<'_> {
+impl ZlibBlocks<'_> {
     fn decode_next(&mut self, n_compressed: u64, expected_bytes: u64) -> io::Result<()> {
         self.block.clear();
         self.n_given = 0;
@@ -112,7 +116,7 @@ impl Blocks<'_> {
     }
 }
 
-impl Read for Blocks<'_> {
+impl Read for ZlibBlocks<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         while self.n_given == self.block.len() {
             if let Some(fault) = self.fault.take() {

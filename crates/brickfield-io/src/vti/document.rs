@@ -27,7 +27,7 @@ pub(super) enum WordSize {
 
 /// How the numbers of an array are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Storage {
+pub(super) enum ArrayStorage {
     Text,
     Base64,
     Raw,
@@ -59,7 +59,7 @@ pub(super) struct Document {
     pub(super) point_scalars: Option<String>,
     pub(super) cell_scalars: Option<String>,
     pub(super) arrays: Vec<Array>,
-    appended: Option<(Storage, u64)>,
+    appended: Option<(ArrayStorage, u64)>,
     has_piece: bool,
     support: Option<Support>,
     /// The length of a file that ends before its root element does.
@@ -70,7 +70,7 @@ pub(super) struct Document {
 enum Next {
     Go,
     SkipText,
-    FindAppended(Storage),
+    FindAppended(ArrayStorage),
 }
 
 impl Document {
@@ -103,10 +103,10 @@ impl Document {
         }
     }
 
-    pub(super) fn storage(&self, array: &Array) -> Result<Storage, ReadError> {
+    pub(super) fn storage(&self, array: &Array) -> Result<ArrayStorage, ReadError> {
         match (array.format.as_str(), self.appended) {
-            ("ascii", _) => Ok(Storage::Text),
-            ("binary", _) => Ok(Storage::Base64),
+            ("ascii", _) => Ok(ArrayStorage::Text),
+            ("binary", _) => Ok(ArrayStorage::Base64),
             ("appended", Some((storage, _))) => Ok(storage),
             ("appended", None) => Err(self.missing("the element AppendedData")),
             (other, _) => Err(ReadError::unsupported("DataArray format", other, "ascii, binary and appended are")),
@@ -301,8 +301,8 @@ fn element(document: &mut Option<Document>, e: &BytesStart, position: u64) -> Re
 
 fn appended(e: &BytesStart) -> Result<Next, ReadError> {
     match attribute(e, "encoding")?.as_deref() {
-        Some("raw") => Ok(Next::FindAppended(Storage::Raw)),
-        Some("base64") | None => Ok(Next::FindAppended(Storage::Base64)),
+        Some("raw") => Ok(Next::FindAppended(ArrayStorage::Raw)),
+        Some("base64") | None => Ok(Next::FindAppended(ArrayStorage::Base64)),
         Some(other) => Err(ReadError::unsupported("AppendedData encoding", other, "raw and base64 are")),
     }
 }

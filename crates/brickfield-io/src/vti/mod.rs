@@ -14,13 +14,13 @@ use brickfield_core::{ScalarType, Voxels};
 
 use crate::error::check_length;
 use crate::files::{ByteSource, n_bytes_left};
-use crate::limits::Shape;
-use crate::opened::Found;
-use crate::placement::Placement;
+use crate::limits::CheckedShape;
+use crate::opened::FileFacts;
+use crate::placement::GridPlacement;
 use crate::samples::{allocate, append_binary, append_text, least_text_bytes};
 use crate::{Format, Limits, Note, Opened, ReadError};
 use blocks::{WordReader, check_plain, read_blocks};
-use document::{Array, Document, Storage, Support};
+use document::{Array, ArrayStorage, Document, Support};
 use inline::{Base64Reader, UntilTag};
 
 /// Reads a .vti file.
@@ -36,10 +36,10 @@ pub fn read(mut input: impl BufRead + Seek, limits: &Limits) -> Result<Opened, R
 
 fn read_from(source: &mut dyn ByteSource, limits: &Limits) -> Result<Opened, ReadError> {
     let document = Document::read(source)?;
-    let mut found = Found::plain(Format::Vti);
+    let mut found = FileFacts::plain(Format::Vti);
     let array = choose(&document, &mut found.notes)?;
     let scalar = scalar(&array.type_name)?;
-    let shape = Shape::claim(dims(&document.extent, array.support)?, scalar, limits)?;
+    let shape = CheckedShape::claim(dims(&document.extent, array.support)?, scalar, limits)?;
     let grid = placement(&document, array.support).grid(shape.dims)?;
     let voxels = read_array(source, &document, array, &shape)?;
     found.finish(grid, voxels)
@@ -101,7 +101,7 @@ fn dims(extent: &[i64; 6], support: Support) -> Result<[u64; 3], ReadError> {
     Ok(dims)
 }
 
-fn placement(document: &Document, support: Support) -> Placement {
+fn placement(document: &Document, support: Support) -> GridPlacement {
     let to_sample = match support {
         Support::Points => DVec3::ZERO,
         Support::Cells => DVec3::splat(0.5),
@@ -111,31 +111,31 @@ fn placement(document: &Document, support: Support) -> Placement {
     let direction = DMat3::from_cols_array(&document.direction).transpose();
     let steps = direction * DMat3::from_diagonal(DVec3::from(document.spacing));
     let first_sample = DVec3::from(document.origin) + steps * (DVec3::new(x, y, z) + to_sample);
-    Placement { first_sample, steps }
+    GridPlacement { first_sample, steps }
 }
 
 fn read_array(
     source: &mut dyn ByteSource,
     document: &Document,
     array: &Array,
-    shape: &Shape,
+    shape: &CheckedShape,
 ) -> Result<Voxels, ReadError> {
     let what = format!("DataArray {:?}", array.name);
     let position = document.position(array)?;
     source.seek(SeekFrom::Start(position)).map_err(|e| ReadError::io(&what, e))?;
     let n_left = n_bytes_left(source)?;
     match document.storage(array)? {
-        Storage::Text => {
+        ArrayStorage::Text => {
             check_length(&what, n_left, least_text_bytes(shape.n_voxels()))?;
             let mut voxels = allocate(shape)?;
             append_text(&mut voxels, &mut UntilTag::new(source), shape.n_voxels(), &what)?;
             Ok(voxels)
         }
-        Storage::Raw => {
+        ArrayStorage::Raw => {
             let n_tail = n_closing_bytes(source, n_left).map_err(|e| ReadError::io(&what, e))?;
             read_binary(source, n_left - n_tail, document, shape, &what)
         }
-        Storage::Base64 => {
+        ArrayStorage::Base64 => {
             let mut decoded = Base64Reader::new(UntilTag::new(source));
             read_binary(&mut decoded, n_left / 4 * 3 + 3, document, shape, &what)
         }
@@ -161,7 +161,7 @@ fn read_binary(
     reader: &mut dyn Read,
     n_left: u64,
     document: &Document,
-    shape: &Shape,
+    shape: &CheckedShape,
     what: &str,
 ) -> Result<Voxels, ReadError> {
     let mut words = WordReader { reader, size: document.word, order: document.order, what };

@@ -6,7 +6,7 @@ use brickfield_io::{Format, Limits, detect, open};
 
 use crate::common::LIMITS;
 
-pub(crate) struct Case {
+pub(crate) struct BadFile {
     pub(crate) name: &'static str,
     /// A file that opens.
     pub(crate) good: Vec<u8>,
@@ -15,16 +15,16 @@ pub(crate) struct Case {
     unsupported: (&'static [u8], &'static [u8], &'static str),
 }
 
-pub(crate) fn cases() -> Vec<Case> {
+pub(crate) fn cases() -> Vec<BadFile> {
     #[allow(unused_mut)]
     let mut cases = vec![
-        Case {
+        BadFile {
             name: "v.nrrd",
             good: b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 4 3 2\nencoding: raw\n\n012345678901234567890123".to_vec(),
             absurd: (b"4 3 2", b"16384 16384 4096", "1099511627776 bytes; the limit is"),
             unsupported: (b"uchar", b"int64", "type \"int64\" is not supported"),
         },
-        Case {
+        BadFile {
             name: "v.mha",
             good: b"NDims = 3\nDimSize = 4 3 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n012345678901234567890123"
                 .to_vec(),
@@ -33,7 +33,7 @@ pub(crate) fn cases() -> Vec<Case> {
         },
     ];
     #[cfg(feature = "vti")]
-    cases.push(Case {
+    cases.push(BadFile {
         name: "v.vti",
         good: b"<VTKFile type=\"ImageData\"><ImageData WholeExtent=\"0 3 0 2 0 1\"><Piece><PointData>\
                 <DataArray type=\"UInt8\" Name=\"a\">0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1 2 3</DataArray>\
@@ -43,14 +43,14 @@ pub(crate) fn cases() -> Vec<Case> {
         unsupported: (b"UInt8", b"Int64", "DataArray type \"Int64\" is not supported"),
     });
     #[cfg(feature = "nifti")]
-    cases.push(Case {
+    cases.push(BadFile {
         name: "v.nii",
-        good: [crate::nifti::Header::new(2).bytes(), vec![1; 24]].concat(),
+        good: [crate::nifti::NiftiHeader::new(2).bytes(), vec![1; 24]].concat(),
         absurd: (b"\x03\0\x04\0\x03\0\x02\0", b"\x03\0\x00\x40\x00\x40\x00\x10", "1099511627776 bytes; the limit is"),
         unsupported: (b"\0\0\x02\0\0\0", b"\0\0\x00\x04\0\0", "datatype \"int64 (code 1024)\" is not supported"),
     });
     #[cfg(feature = "dicom")]
-    cases.push(Case {
+    cases.push(BadFile {
         name: "v.dcm",
         good: crate::dicom::Slice::at(1.0).bytes(),
         absurd: (b"\x28\0\x10\0US\x02\0\x02\0", b"\x28\0\x10\0US\x02\0\xff\xff", "promised"),

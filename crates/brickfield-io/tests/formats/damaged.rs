@@ -153,7 +153,7 @@ mod packed {
     #[cfg(feature = "nifti")]
     #[test]
     fn nifti() {
-        let file = gzip_unpressed(&[crate::nifti::Header::new(2).bytes(), DATA.to_vec()].concat());
+        let file = gzip_unpressed(&[crate::nifti::NiftiHeader::new(2).bytes(), DATA.to_vec()].concat());
         let at_end = "the image holds the 24 bytes promised, but its compressed data are cut off at the end, where the checksum is";
         let cases = [
             (10 + 5 + 352 + 10, "the image holds 10 bytes, then its compressed data are cut off; 24 are promised"),

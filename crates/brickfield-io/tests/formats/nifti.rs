@@ -8,7 +8,7 @@ use crate::common::*;
 
 /// The fields of a header that these tests set.
 #[derive(Clone)]
-pub(crate) struct Header {
+pub(crate) struct NiftiHeader {
     pub(crate) order: ByteOrder,
     pub(crate) dim: [i16; 8],
     pub(crate) datatype: i16,
@@ -21,9 +21,9 @@ pub(crate) struct Header {
     pub(crate) magic: [u8; 4],
 }
 
-impl Header {
-    pub(crate) fn new(datatype: i16) -> Header {
-        Header {
+impl NiftiHeader {
+    pub(crate) fn new(datatype: i16) -> NiftiHeader {
+        NiftiHeader {
             order: ByteOrder::Little,
             dim: [3, 4, 3, 2, 1, 1, 1, 1],
             datatype,
@@ -72,7 +72,7 @@ fn datatype(scalar: ScalarType) -> i16 {
     }
 }
 
-fn read(header: &Header, data: &[u8], files: &dyn DataFiles) -> Result<Opened, ReadError> {
+fn read(header: &NiftiHeader, data: &[u8], files: &dyn DataFiles) -> Result<Opened, ReadError> {
     nifti::read(Cursor::new([header.bytes(), data.to_vec()].concat()), "scan", files, &LIMITS)
 }
 
@@ -80,7 +80,7 @@ fn read(header: &Header, data: &[u8], files: &dyn DataFiles) -> Result<Opened, R
 fn every_type_in_both_orders_plain_and_gzipped() {
     for scalar in ScalarType::ALL {
         for order in ORDERS {
-            let header = Header { order, ..Header::new(datatype(scalar)) };
+            let header = NiftiHeader { order, ..NiftiHeader::new(datatype(scalar)) };
             let data = bytes(&ramp(scalar), order);
             assert_ramp(&read(&header, &data, &NoFiles).unwrap(), scalar);
             let packed = gzip(&[header.bytes(), data].concat());
@@ -91,7 +91,7 @@ fn every_type_in_both_orders_plain_and_gzipped() {
 
 #[test]
 fn a_pair_of_header_and_image() {
-    let header = Header { magic: *b"ni1\0", offset: 0.0, ..Header::new(2) };
+    let header = NiftiHeader { magic: *b"ni1\0", offset: 0.0, ..NiftiHeader::new(2) };
     let data = bytes(&ramp(ScalarType::U8), ByteOrder::Little);
     let plain = files([("scan.img", data.clone())]);
     assert_ramp(&read(&header, &[], &plain).unwrap(), ScalarType::U8);
@@ -102,22 +102,23 @@ fn a_pair_of_header_and_image() {
 
 #[test]
 fn sform_before_qform_before_pixdim() {
-    let plain = read(&Header::new(2), &[0; 24], &NoFiles).unwrap();
+    let plain = read(&NiftiHeader::new(2), &[0; 24], &NoFiles).unwrap();
     assert_eq!((plain.frame, plain.unit.as_deref()), (WorldFrame::Plain, Some("mm")));
     assert_near(centre(&plain, 1.0, 1.0, 1.0), [2.0, 3.0, 4.0]);
     // A quarter turn about z takes x to y and y to -x; qfac -1 mirrors z. Then x and y are negated.
     let half = std::f32::consts::FRAC_1_SQRT_2;
-    let mut turned = Header { codes: [1, 0], quaternion: [0.0, 0.0, half, 10.0, 20.0, 30.0], ..Header::new(2) };
+    let mut turned =
+        NiftiHeader { codes: [1, 0], quaternion: [0.0, 0.0, half, 10.0, 20.0, 30.0], ..NiftiHeader::new(2) };
     turned.pixdim[0] = -1.0;
     let by_qform = read(&turned, &[0; 24], &NoFiles).unwrap();
     assert_eq!(by_qform.frame, WorldFrame::Lps);
     assert_near(centre(&by_qform, 1.0, 0.0, 0.0), [-10.0, -22.0, 30.0]);
     assert_near(centre(&by_qform, 0.0, 1.0, 1.0), [-7.0, -20.0, 26.0]);
     let rows = [[5.0, 0.0, 0.0, 1.0], [0.0, 0.0, 6.0, 2.0], [0.0, 7.0, 0.0, 3.0]];
-    let by_sform = read(&Header { codes: [1, 2], rows, ..turned.clone() }, &[0; 24], &NoFiles).unwrap();
+    let by_sform = read(&NiftiHeader { codes: [1, 2], rows, ..turned.clone() }, &[0; 24], &NoFiles).unwrap();
     assert_near(centre(&by_sform, 1.0, 1.0, 1.0), [-6.0, -8.0, 10.0]);
     assert_eq!(by_sform.volume.grid().spacing(), DVec3::new(5.0, 7.0, 6.0));
-    let singular = read(&Header { codes: [1, 2], ..turned }, &[0; 24], &NoFiles).unwrap();
+    let singular = read(&NiftiHeader { codes: [1, 2], ..turned }, &[0; 24], &NoFiles).unwrap();
     assert_near(centre(&singular, 1.0, 0.0, 0.0), [-10.0, -22.0, 30.0]);
     assert!(matches!(singular.notes[..], [Note::OrientationIgnored { .. }]));
 }
@@ -125,7 +126,8 @@ fn sform_before_qform_before_pixdim() {
 #[test]
 fn slope_and_intercept() {
     let scaled = |datatype, scale, data: &[u8]| {
-        read(&Header { scale, dim: [1, 2, 1, 1, 1, 1, 1, 1], ..Header::new(datatype) }, data, &NoFiles).unwrap()
+        read(&NiftiHeader { scale, dim: [1, 2, 1, 1, 1, 1, 1, 1], ..NiftiHeader::new(datatype) }, data, &NoFiles)
+            .unwrap()
     };
     let by_half = scaled(2, [0.5, -1.0], &[0, 3]);
     assert_eq!(by_half.volume.voxels(), &Voxels::F32(vec![-1.0, 0.5]));
@@ -140,7 +142,7 @@ fn slope_and_intercept() {
 
 #[test]
 fn of_a_series_the_first_volume() {
-    let header = Header { dim: [4, 4, 3, 2, 5, 1, 1, 1], ..Header::new(2) };
+    let header = NiftiHeader { dim: [4, 4, 3, 2, 5, 1, 1, 1], ..NiftiHeader::new(2) };
     let opened = read(&header, &[7; 120], &NoFiles).unwrap();
     assert!(matches!(&opened.notes[..], [Note::FirstOfAxis { n_entries: 5, .. }]));
     assert_eq!(opened.volume.grid().dims(), DIMS);
@@ -148,28 +150,32 @@ fn of_a_series_the_first_volume() {
 
 #[test]
 fn headers_that_lie() {
-    let refusal = |header: Header| read(&header, &[0; 23], &NoFiles).unwrap_err().to_string();
-    assert_eq!(refusal(Header::new(2)), "the file holds 375 bytes; 376 are promised");
+    let refusal = |header: NiftiHeader| read(&header, &[0; 23], &NoFiles).unwrap_err().to_string();
+    assert_eq!(refusal(NiftiHeader::new(2)), "the file holds 375 bytes; 376 are promised");
     assert_eq!(
-        refusal(Header::new(128)),
+        refusal(NiftiHeader::new(128)),
         "datatype \"RGB24 (code 128)\" is not supported; 8, 16 and 32 bit integers, 32 and 64 bit floats are"
     );
-    assert!(refusal(Header::new(1024)).contains("int64"));
-    assert!(refusal(Header { dim: [3, -4, 3, 2, 1, 1, 1, 1], ..Header::new(2) }).contains("dim[1] is \"-4\""));
-    assert!(refusal(Header { dim: [0, 4, 3, 2, 1, 1, 1, 1], ..Header::new(2) }).contains("dim[0]"));
-    assert!(refusal(Header { dim: [3, 32767, 32767, 32767, 1, 1, 1, 1], ..Header::new(2) }).contains("limit"));
-    assert!(refusal(Header { offset: f32::NAN, ..Header::new(2) }).contains("vox_offset"));
-    assert!(refusal(Header { offset: 1e15, ..Header::new(2) }).contains("promised"));
-    assert!(refusal(Header { magic: *b"n+2\0", ..Header::new(2) }).contains("not NIfTI: magic is"));
+    assert!(refusal(NiftiHeader::new(1024)).contains("int64"));
+    assert!(
+        refusal(NiftiHeader { dim: [3, -4, 3, 2, 1, 1, 1, 1], ..NiftiHeader::new(2) }).contains("dim[1] is \"-4\"")
+    );
+    assert!(refusal(NiftiHeader { dim: [0, 4, 3, 2, 1, 1, 1, 1], ..NiftiHeader::new(2) }).contains("dim[0]"));
+    assert!(
+        refusal(NiftiHeader { dim: [3, 32767, 32767, 32767, 1, 1, 1, 1], ..NiftiHeader::new(2) }).contains("limit")
+    );
+    assert!(refusal(NiftiHeader { offset: f32::NAN, ..NiftiHeader::new(2) }).contains("vox_offset"));
+    assert!(refusal(NiftiHeader { offset: 1e15, ..NiftiHeader::new(2) }).contains("promised"));
+    assert!(refusal(NiftiHeader { magic: *b"n+2\0", ..NiftiHeader::new(2) }).contains("not NIfTI: magic is"));
 }
 
 #[test]
 fn a_bomb_stays_shut() {
-    let header = Header { dim: [3, 1000, 1000, 1, 1, 1, 1, 1], ..Header::new(2) };
+    let header = NiftiHeader { dim: [3, 1000, 1000, 1, 1, 1, 1, 1], ..NiftiHeader::new(2) };
     let small = gzip(&header.bytes());
     let fault = nifti::read(Cursor::new(small), "", &NoFiles, &LIMITS).unwrap_err();
     assert!(matches!(fault, ReadError::TooFewCompressed { .. }), "{fault}");
-    let long = gzip(&[Header::new(2).bytes(), vec![0; 1 << 24]].concat());
+    let long = gzip(&[NiftiHeader::new(2).bytes(), vec![0; 1 << 24]].concat());
     let opened = nifti::read(Cursor::new(long), "", &NoFiles, &LIMITS).unwrap();
     assert!(matches!(opened.notes[..], [Note::SurplusData]));
 }

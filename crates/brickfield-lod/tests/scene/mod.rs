@@ -6,7 +6,7 @@ use brickfield_lod::{Criterion, Culling, View};
 use proptest::prelude::*;
 
 #[derive(Clone, Debug)]
-pub(crate) struct Scene {
+pub(crate) struct SelectionInput {
     pub(crate) layout: BrickLayout,
     pub(crate) grid: Grid,
     pub(crate) view: View,
@@ -64,11 +64,11 @@ fn camera(grid: Grid) -> impl Strategy<Value = Camera> {
     })
 }
 
-pub(crate) fn scene(culling: Culling) -> impl Strategy<Value = Scene> {
+pub(crate) fn scene(culling: Culling) -> impl Strategy<Value = SelectionInput> {
     let size = [1u32..40, 1u32..40].prop_map(UVec2::from);
     let grids = (dims(), 0usize..3).prop_flat_map(|(dims, side)| (grid(dims), Just(BrickSide::ALL[side])));
     let cameras = grids.prop_flat_map(|(grid, side)| (Just(grid), Just(side), camera(grid)));
-    (cameras, size).prop_map(move |((grid, side, camera), size)| Scene {
+    (cameras, size).prop_map(move |((grid, side, camera), size)| SelectionInput {
         layout: BrickLayout::new(grid.dims(), side),
         grid,
         view: View { camera, size, culling },

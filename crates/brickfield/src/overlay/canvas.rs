@@ -17,15 +17,15 @@ pub(super) struct Ink {
 const HEIGHT: f64 = 512.0;
 
 /// A picture, and by how much lines cover its pixels.
-pub(super) struct Canvas {
+pub(super) struct LinePicture {
     image: Image<f32>,
     /// White; its alpha is the coverage. `None` for a picture without pixels.
     coverage: Option<Pixmap>,
 }
 
-impl Canvas {
-    pub(super) fn new(image: &Image<f32>) -> Canvas {
-        Canvas { image: image.clone(), coverage: Pixmap::new(image.size().x, image.size().y) }
+impl LinePicture {
+    pub(super) fn new(image: &Image<f32>) -> LinePicture {
+        LinePicture { image: image.clone(), coverage: Pixmap::new(image.size().x, image.size().y) }
     }
 
     /// Lines over the picture: where several cross, only once.
@@ -76,7 +76,7 @@ mod tests {
     const BLACK: Ink = Ink { color: [0.0; 3], opacity: 1.0, width: 1.0 };
 
     fn drawn(lines: &[[DVec2; 2]], ink: &Ink) -> Image<f32> {
-        let mut canvas = Canvas::new(&Image::new(UVec2::new(9, 7), vec![[0.5, 0.25, 0.0, 0.5]; 63]).unwrap());
+        let mut canvas = LinePicture::new(&Image::new(UVec2::new(9, 7), vec![[0.5, 0.25, 0.0, 0.5]; 63]).unwrap());
         canvas.stroke(lines, ink);
         canvas.into_image()
     }

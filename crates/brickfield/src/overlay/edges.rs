@@ -14,7 +14,7 @@ pub(super) struct Edge {
 
 /// A brick's edge in half voxels, of which corners have whole numbers. Ordered by line, along it, the longest and coarsest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Piece {
+struct EdgePiece {
     axis: usize,
     /// On the other two axes.
     at: [i64; 2],
@@ -26,21 +26,21 @@ struct Piece {
 /// The edges of the boxes of bricks, the finest level first. No two lie on each other; edges of a level that follow each other
 /// are one.
 pub(super) fn edges(layout: &BrickLayout, bricks: &[BrickId]) -> Vec<Edge> {
-    let mut pieces: Vec<Piece> = bricks.iter().flat_map(|id| pieces(*id, &layout.index_box(*id))).collect();
+    let mut pieces: Vec<EdgePiece> = bricks.iter().flat_map(|id| pieces(*id, &layout.index_box(*id))).collect();
     pieces.sort_unstable();
-    let same_line = |a: &Piece, b: &Piece| (a.axis, a.at) == (b.axis, b.at);
+    let same_line = |a: &EdgePiece, b: &EdgePiece| (a.axis, a.at) == (b.axis, b.at);
     let mut edges: Vec<Edge> = pieces.chunk_by(same_line).flat_map(along_a_line).map(edge).collect();
     edges.sort_by_key(|edge| edge.level);
     edges
 }
 
 /// The twelve edges of a box.
-fn pieces(id: BrickId, b: &Aabb) -> impl Iterator<Item = Piece> + use<> {
+fn pieces(id: BrickId, b: &Aabb) -> impl Iterator<Item = EdgePiece> + use<> {
     let halves = |v: DVec3| (2.0 * v).to_array().map(|x| x as i64);
     let bounds = [halves(b.min), halves(b.max)];
     (0..3usize).flat_map(move |axis| {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        (0..4usize).map(move |i| Piece {
+        (0..4usize).map(move |i| EdgePiece {
             axis,
             at: [bounds[i & 1][u], bounds[i >> 1][v]],
             start: bounds[0][axis],
@@ -51,8 +51,8 @@ fn pieces(id: BrickId, b: &Aabb) -> impl Iterator<Item = Piece> + use<> {
 }
 
 /// The pieces of a line without the parts on which other pieces lie.
-fn along_a_line(pieces: &[Piece]) -> Vec<Piece> {
-    let mut left: Vec<Piece> = Vec::new();
+fn along_a_line(pieces: &[EdgePiece]) -> Vec<EdgePiece> {
+    let mut left: Vec<EdgePiece> = Vec::new();
     for piece in pieces {
         // Of two edges of an octree on a line, one lies in the other, or they do not overlap.
         match left.last_mut() {
@@ -66,7 +66,7 @@ fn along_a_line(pieces: &[Piece]) -> Vec<Piece> {
     left
 }
 
-fn edge(piece: Piece) -> Edge {
+fn edge(piece: EdgePiece) -> Edge {
     let end = |along: i64| {
         let mut p = [0.0; 3];
         p[piece.axis] = along as f64 / 2.0;

@@ -10,9 +10,9 @@ use brickfield_core::glam::{DVec2, DVec3, UVec2};
 use brickfield_core::{BrickId, BrickLayout, Camera, Grid, Image, IndexPos, Level, LinearRgb};
 use palette::{LinSrgb, Srgb};
 
-use canvas::{Canvas, Ink};
+use canvas::{Ink, LinePicture};
 use edges::edges;
-use projector::Projector;
+use projector::CameraProjector;
 
 /// The colour of a level's bricks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,8 +92,8 @@ fn show(
     bricks: &[BrickId],
     share: f64,
 ) -> Image<f32> {
-    let projector = Projector::new(camera, image.size());
-    let mut canvas = Canvas::new(image);
+    let projector = CameraProjector::new(camera, image.size());
+    let mut canvas = LinePicture::new(image);
     // The finest first: lines of coarser levels lie over them.
     for of_level in edges(layout, bricks).chunk_by(|a, b| a.level == b.level) {
         let world = |p: DVec3| grid.world(IndexPos(p)).0;
@@ -114,10 +114,10 @@ fn of_level_ink(level: Level) -> Ink {
 ///
 /// Black, 1.25 pixels wide, on a white edge; otherwise as [`show_bricks`].
 pub fn show_camera(image: &Image<f32>, camera: &Camera, of: &Camera, of_size: UVec2, length_world: f64) -> Image<f32> {
-    let projector = Projector::new(camera, image.size());
+    let projector = CameraProjector::new(camera, image.size());
     let lines: Vec<_> =
         pyramid(of, of_size, length_world).into_iter().filter_map(|ends| projector.line(ends)).collect();
-    let mut canvas = Canvas::new(image);
+    let mut canvas = LinePicture::new(image);
     canvas.stroke(&lines, &CAMERA_HALO);
     canvas.stroke(&lines, &CAMERA_INK);
     canvas.into_image()

@@ -4,7 +4,7 @@ use brickfield_core::glam::{DVec2, DVec3, UVec2};
 use brickfield_core::{Camera, PixelRays};
 
 /// Where a camera's picture shows the world: the inverse of [`PixelRays::at`].
-pub(super) struct Projector {
+pub(super) struct CameraProjector {
     camera: Camera,
     rays: PixelRays,
     /// Half the size of the window in the plane at distance 1 (parallel rays: in the eye's plane): the picture, and a margin around it.
@@ -16,11 +16,11 @@ const MARGIN_PIXELS: f64 = 200.0;
 /// The part of a line that is nearer to the eye than this share of its farther end is cut off.
 const NEAR: f64 = 1e-6;
 
-impl Projector {
-    pub(super) fn new(camera: &Camera, size: UVec2) -> Projector {
+impl CameraProjector {
+    pub(super) fn new(camera: &Camera, size: UVec2) -> CameraProjector {
         let rays = camera.pixel_rays(size);
         let half = rays.corner().abs() + MARGIN_PIXELS * rays.pixel();
-        Projector { camera: *camera, rays, half }
+        CameraProjector { camera: *camera, rays, half }
     }
 
     /// The part of a line in the world that lies before the eye and in the picture or its margin, in pixels from the picture's
@@ -100,7 +100,7 @@ mod tests {
             let camera = Camera::look_at(eye, target, DVec3::new(0.1, 0.2, 1.0), projection(is_perspective, width));
             prop_assume!(camera.is_ok());
             let camera = camera.unwrap();
-            let (projector, rays) = (Projector::new(&camera, SIZE), camera.pixel_rays(SIZE));
+            let (projector, rays) = (CameraProjector::new(&camera, SIZE), camera.pixel_rays(SIZE));
             for corner in layout.bricks(Level(0)).flat_map(|id| layout.index_box(id).corners()) {
                 let corner = grid.world(IndexPos(corner)).0;
                 let depth = (corner - camera.eye()).dot(camera.forward());
@@ -129,7 +129,7 @@ mod tests {
             width in 0.0..1.0,
         ) {
             let camera = Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Z, projection(is_perspective, width)).unwrap();
-            let projector = Projector::new(&camera, SIZE);
+            let projector = CameraProjector::new(&camera, SIZE);
             if let Some(ends) = projector.line([a.into(), b.into()]) {
                 let margin = MARGIN_PIXELS + 1e-3;
                 for end in ends {
@@ -146,7 +146,7 @@ mod tests {
     fn what_lies_behind_the_eye_is_cut_off() {
         for is_perspective in [true, false] {
             let camera = Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Z, projection(is_perspective, 0.4)).unwrap();
-            let line = |a: [f64; 3], b: [f64; 3]| Projector::new(&camera, SIZE).line([a.into(), b.into()]);
+            let line = |a: [f64; 3], b: [f64; 3]| CameraProjector::new(&camera, SIZE).line([a.into(), b.into()]);
             assert_eq!(line([-5.0, 1.0, 1.0], [-1.0, 1.0, 1.0]), None);
             // Through the eye, along the view: its part before the eye is a point.
             let [from, to] = line([-5.0, 0.0, 0.0], [5.0, 0.0, 0.0]).unwrap();

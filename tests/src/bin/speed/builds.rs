@@ -7,7 +7,7 @@ use std::path::Path;
 use brickfield_conformance::turns::{Bound, Claim, Offer, Ratio, Server, ServerError, Standing, take_turns};
 use serde::Serialize;
 
-use crate::{Options, Table};
+use crate::{Arguments, Table};
 
 /// How many times as long a backend may take as in the other build.
 const SLOWEST: Bound = Bound::AtMost(1.03);
@@ -22,7 +22,7 @@ pub(crate) struct BuildRatio {
 
 /// Times the contestants that both builds have. The claim about a backend is about the geometric mean over its contestants, round
 /// by round.
-pub(crate) fn against(options: &Options, program: &Path) -> anyhow::Result<Table> {
+pub(crate) fn against(options: &Arguments, program: &Path) -> anyhow::Result<Table> {
     let arguments = arguments(options);
     let mut this = Server::start(&std::env::current_exe()?, &arguments)?;
     let mut other = Server::start(program, &arguments)?;
@@ -53,7 +53,7 @@ pub(crate) fn against(options: &Options, program: &Path) -> anyhow::Result<Table
 }
 
 /// The arguments with which both builds serve the same contestants.
-fn arguments(options: &Options) -> Vec<OsString> {
+fn arguments(options: &Arguments) -> Vec<OsString> {
     let mut arguments: Vec<OsString> = vec!["--serve".into(), "--data".into(), options.data.clone().into()];
     arguments.extend(["--size".into(), options.size.to_string().into()]);
     arguments.extend(options.only.iter().flat_map(|only| ["--only".into(), only.into()]));

@@ -24,7 +24,7 @@ use volumes::{Entrant, Group, TimedVolume};
 /// Times skipping, brick sides, backends, an empty frame and the octree's build, contestants alternating; or two builds
 /// against each other (--other)
 #[derive(Parser)]
-struct Options {
+struct Arguments {
     /// The folder of real volumes
     #[arg(long, env = "BRICKFIELD_DATA", value_name = "FOLDER")]
     data: PathBuf,
@@ -56,7 +56,7 @@ struct Options {
 
 /// The times of a contestant on a backend, in milliseconds.
 #[derive(Clone, Debug, Serialize)]
-struct Times {
+struct EntrantTimes {
     what: String,
     backend: &'static str,
     #[serde(flatten)]
@@ -68,7 +68,7 @@ struct Times {
 /// The numbers of a run.
 #[derive(Default, Serialize)]
 struct Table {
-    times: Vec<Times>,
+    times: Vec<EntrantTimes>,
     builds: Vec<BuildRatio>,
     claims: Vec<Claim>,
 }
@@ -76,7 +76,7 @@ struct Table {
 type Backends = Vec<(BackendKind, Box<dyn Backend>)>;
 
 fn main() -> anyhow::Result<ExitCode> {
-    let options = Options::parse();
+    let options = Arguments::parse();
     anyhow::ensure!(
         options.only.is_none() || options.other.is_some() || !options.check,
         "--check holds promises, and they need all contestants: leave out --only"
@@ -99,7 +99,7 @@ fn main() -> anyhow::Result<ExitCode> {
 }
 
 /// Times all contestants of this build.
-fn alone(options: &Options) -> anyhow::Result<Table> {
+fn alone(options: &Arguments) -> anyhow::Result<Table> {
     let mut table = Table::default();
     let mut backends = opened(options, &mut |line| println!("{line}"));
     for volume in volumes::read(options) {
@@ -119,7 +119,7 @@ fn alone(options: &Options) -> anyhow::Result<Table> {
 }
 
 /// Opens all backends; `say` is told which, and which are absent.
-fn opened(options: &Options, say: &mut dyn FnMut(&str)) -> Backends {
+fn opened(options: &Arguments, say: &mut dyn FnMut(&str)) -> Backends {
     let mut backends = Backends::new();
     for kind in BackendKind::ALL {
         match open_backend(kind, options.adapter.as_deref(), Validation::Off) {
@@ -140,10 +140,10 @@ fn kinds(backends: &Backends) -> Vec<BackendKind> {
 
 /// Every entrant once a round, with its bricks resident.
 fn alternate(
-    options: &Options,
+    options: &Arguments,
     mut entrants: Vec<Entrant<'_>>,
     backends: &mut Backends,
-) -> Result<Vec<Times>, FrameError> {
+) -> Result<Vec<EntrantTimes>, FrameError> {
     let rounds = take_turns(entrants.len(), options.rounds, |turn| {
         let Entrant { contestant, backend, .. } = &mut entrants[turn.contestant];
         contestant.take(turn, backends[*backend].1.as_mut()).map(|frame| frame.ms)
@@ -153,13 +153,13 @@ fn alternate(
         let spread = Spread::of(&rounds);
         let Spread { median, min, max } = spread;
         println!("{:<32} {backend:<5} {median:>9.2} ms  ({min:.2} to {max:.2})", entrant.what);
-        Times { what: entrant.what, backend, spread, rounds }
+        EntrantTimes { what: entrant.what, backend, spread, rounds }
     };
     Ok(entrants.into_iter().zip(rounds).map(times).collect())
 }
 
 /// Renders frames on request. Standard output belongs to the program that asks.
-fn serve_frames(options: &Options) -> anyhow::Result<()> {
+fn serve_frames(options: &Arguments) -> anyhow::Result<()> {
     let mut backends = opened(options, &mut |line| eprintln!("{line}"));
     let volumes = volumes::read(options).collect::<anyhow::Result<Vec<TimedVolume>>>()?;
     let mut entrants = Vec::new();

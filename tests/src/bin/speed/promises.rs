@@ -12,13 +12,13 @@ use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{BrickSide, Grid, Image, Volume};
 
 use crate::volumes::{TimedVolume, tree};
-use crate::{Backends, Options, Times};
+use crate::{Arguments, Backends, EntrantTimes};
 
 /// Skipping, an empty frame and the pictures of each backend; the CPU path against wgpu.
 pub(crate) fn of_skipping(
-    options: &Options,
+    options: &Arguments,
     volume: &TimedVolume,
-    times: &[Times],
+    times: &[EntrantTimes],
     backends: &mut Backends,
 ) -> anyhow::Result<Vec<Claim>> {
     let name = volume.name;

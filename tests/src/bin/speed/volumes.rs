@@ -9,7 +9,7 @@ use brickfield_conformance::turns::{Contestant, Offer};
 use brickfield_core::glam::UVec2;
 use brickfield_core::{BrickSide, TransferFunction, Volume};
 
-use crate::{Backends, Options};
+use crate::{Arguments, Backends};
 
 /// Name, path below the data folder, and how many times as fast skipping must be in fast mode.
 const VOLUMES: [(&str, &str, f64); 2] = [("engine", "ct/engine.vti", 2.0), ("aneurism", "ct/aneurism.vti", 4.0)];
@@ -41,7 +41,7 @@ pub(crate) struct Entrant<'a> {
 }
 
 /// Reads the volumes one by one.
-pub(crate) fn read(options: &Options) -> impl Iterator<Item = anyhow::Result<TimedVolume>> {
+pub(crate) fn read(options: &Arguments) -> impl Iterator<Item = anyhow::Result<TimedVolume>> {
     VOLUMES.into_iter().map(|(name, path, skipping_gains)| {
         let volume = open(&options.data.join(path), &Limits::default())?.volume;
         let trees = BrickSide::ALL.into_iter().map(|side| Ok((side, tree(&volume, side)?)));
@@ -58,7 +58,7 @@ impl TimedVolume {
     /// The contestants of a group on each of the backends, as far as they are asked for.
     pub(crate) fn entrants(
         &self,
-        options: &Options,
+        options: &Arguments,
         group: Group,
         backends: &[BackendKind],
     ) -> anyhow::Result<Vec<Entrant<'_>>> {
@@ -79,7 +79,7 @@ impl TimedVolume {
     }
 
     /// The scene in a mode.
-    pub(crate) fn scene(&self, options: &Options, mode: Mode, skipping: Skipping) -> anyhow::Result<Scene> {
+    pub(crate) fn scene(&self, options: &Arguments, mode: Mode, skipping: Skipping) -> anyhow::Result<Scene> {
         let size = UVec2::splat(options.size);
         let camera = Viewpoint::default().camera(self.volume.grid(), WorldFrame::Plain, size)?;
         Ok(Scene { mode, skipping, step_voxels: 0.5, ..Scene::new(camera, size, automatic(&self.volume)) })
@@ -91,7 +91,7 @@ impl TimedVolume {
         &middle.expect("octrees of all sides").1
     }
 
-    fn skipping(&self, options: &Options) -> anyhow::Result<Vec<(String, &BrickTree, Scene)>> {
+    fn skipping(&self, options: &Arguments) -> anyhow::Result<Vec<(String, &BrickTree, Scene)>> {
         let with = |mode, skipping| self.scene(options, mode, skipping);
         let invisible = TransferFunction::constant(0.0, [1.0; 3])?;
         let scenes = [
@@ -105,7 +105,7 @@ impl TimedVolume {
         Ok(scenes.map(named).into())
     }
 
-    fn sides(&self, options: &Options) -> anyhow::Result<Vec<(String, &BrickTree, Scene)>> {
+    fn sides(&self, options: &Arguments) -> anyhow::Result<Vec<(String, &BrickTree, Scene)>> {
         let mut scenes = Vec::new();
         for (side, tree) in &self.trees {
             for (mode, mode_name) in [(Mode::FAST, "fast"), (Mode::Exact, "exact")] {

@@ -3,7 +3,7 @@
 use brickfield_core::glam::{DMat3, DVec3, UVec3};
 use brickfield_core::{Grid, Knot, LinearRgb, ScalarType, TransferFunction, Volume};
 
-use crate::volumes::{Field, fill, fill_unit, spread};
+use crate::volumes::{FieldFormula, fill, fill_unit, spread};
 
 /// Neither cubic nor a whole number of bricks: 3 x 2 x 2 of 16, so that neither the index nor the atlas (3 x 2 x 2) is
 /// the same along x and y.
@@ -38,10 +38,10 @@ pub(super) fn soft(scalar: ScalarType) -> TransferFunction {
 }
 
 /// A ball that is denser towards its centre, off the volume's centre; values in [0, 1].
-pub(super) fn ball_field(grid: &Grid) -> Field {
+pub(super) fn ball_field(grid: &Grid) -> FieldFormula {
     let b = grid.world_box();
     let center = b.center() + b.extent() * DVec3::new(0.06, -0.04, 0.05);
-    Field::GaussianBall { center, sigma: 0.18 * b.extent().min_element(), peak: 1.0 }
+    FieldFormula::GaussianBall { center, sigma: 0.18 * b.extent().min_element(), peak: 1.0 }
 }
 
 pub(super) fn ball(grid: &Grid, scalar: ScalarType) -> Volume {
@@ -77,7 +77,7 @@ pub(super) fn constant(grid: &Grid, scalar: ScalarType, unit: f64) -> Volume {
 pub(super) fn shell(grid: &Grid, scalar: ScalarType) -> Volume {
     let b = grid.world_box();
     let r = 0.5 * b.extent().min_element();
-    let field = Field::Shell { center: b.center() + 0.3, inner: 0.55 * r, outer: 0.85 * r, edge: 3.0 };
+    let field = FieldFormula::Shell { center: b.center() + 0.3, inner: 0.55 * r, outer: 0.85 * r, edge: 3.0 };
     fill_unit(grid, scalar, |p| field.at(p))
 }
 
@@ -92,7 +92,8 @@ pub(super) fn jump(grid: &Grid) -> Volume {
 pub(super) fn sparse(grid: &Grid, scalar: ScalarType) -> Volume {
     let b = grid.world_box();
     let at = |f: DVec3| b.min + b.extent() * f;
-    let ball = |f| Field::Shell { center: at(f), inner: -1.0, outer: 0.12 * b.extent().min_element(), edge: 3.0 };
+    let ball =
+        |f| FieldFormula::Shell { center: at(f), inner: -1.0, outer: 0.12 * b.extent().min_element(), edge: 3.0 };
     let (near, far) = (ball(DVec3::new(0.2, 0.22, 0.18)), ball(DVec3::new(0.8, 0.75, 0.8)));
     fill_unit(grid, scalar, |p| near.at(p) + far.at(p))
 }
@@ -112,6 +113,6 @@ pub(super) fn checkers(dims: UVec3) -> Volume {
 
 pub(super) fn marschner_lobb(n: u32, scalar: ScalarType) -> Volume {
     let grid = Grid::axis_aligned(UVec3::splat(n), DVec3::ONE).expect("a grid");
-    let field = Field::MarschnerLobb { center: grid.world_box().center(), half_side: 0.5 * f64::from(n) };
+    let field = FieldFormula::MarschnerLobb { center: grid.world_box().center(), half_side: 0.5 * f64::from(n) };
     fill_unit(&grid, scalar, |p| field.at(p))
 }

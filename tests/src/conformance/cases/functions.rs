@@ -16,7 +16,7 @@ use brickfield_optics::{QuadratureRule, alpha, depth};
 
 use super::fields::{COOL, WARM, grid, hills, knot, skew_grid, soft};
 use super::setup::{OBLIQUE, Setup, catches};
-use crate::conformance::case::{Case, Check, FunctionTest, Mutant, Point};
+use crate::conformance::case::{Case, Check, FunctionPoint, FunctionTest, Mutant};
 use crate::conformance::plan_mutants::PlanMutant::*;
 use crate::conformance::samples::{PlanSamples, Samples};
 use crate::conformance::shader_mutants as shader;
@@ -30,7 +30,7 @@ fn function(
     mutants: Vec<Mutant>,
     plan: impl Fn() -> FramePlan + Send + Sync + 'static,
     function: ShaderFunction,
-    points: impl Fn(&FramePlan) -> Vec<Point> + Send + Sync + 'static,
+    points: impl Fn(&FramePlan) -> Vec<FunctionPoint> + Send + Sync + 'static,
 ) -> Case {
     let test = move || {
         let plan = plan();
@@ -74,9 +74,9 @@ fn decades(from: i32, to: i32) -> impl Iterator<Item = f64> {
     (from..=to).flat_map(|e| [1.0, 2.0, 5.0].map(|m| m * 10f64.powi(e)))
 }
 
-fn relative_point(x: f32, f: fn(f64) -> f64) -> Point {
+fn relative_point(x: f32, f: fn(f64) -> f64) -> FunctionPoint {
     let expected = f(f64::from(x));
-    Point {
+    FunctionPoint {
         input: [x, 0.0, 0.0, 0.0],
         expected: [expected, 0.0, 0.0, 0.0],
         tolerance: [3e-6 * expected.abs() + 1e-30, 0.0, 0.0, 0.0],
@@ -134,14 +134,14 @@ fn steepness(transfer: &TransferFunction) -> (f64, f64) {
     (most, slopes.fold(0.0, f64::max))
 }
 
-fn classify_points(plan: &FramePlan) -> Vec<Point> {
+fn classify_points(plan: &FramePlan) -> Vec<FunctionPoint> {
     let transfer = plan.transfer();
     let (most, slope) = steepness(transfer);
     let point = |v: f32| {
         let o = transfer.at(f64::from(v));
         let by_value = slope * rounding(transfer, f64::from(v));
         let t = 2e-6 + by_value;
-        Point {
+        FunctionPoint {
             input: [v, 0.0, 0.0, 0.0],
             expected: [o.color[0], o.color[1], o.color[2], o.extinction],
             tolerance: [t, t, t, 2e-6 * most + by_value],
@@ -179,7 +179,7 @@ fn classifications() -> Vec<Case> {
 }
 
 /// Segments of all lengths between values near and far; both ways for the rules of two nodes.
-fn segment_points(plan: &FramePlan) -> Vec<Point> {
+fn segment_points(plan: &FramePlan) -> Vec<FunctionPoint> {
     let (rule, transfer) = (plan.sampling().rule(), plan.transfer());
     let ends = [-4.0f32, -2.3, -1.5, -0.2, 0.6, 0.7, 1.4, 2.5, 5.0, 9.0];
     let lengths = [1e-12f32, 1e-6, 1e-3, 0.1, 1.0, 30.0, 1e6, 1e12];
@@ -187,7 +187,7 @@ fn segment_points(plan: &FramePlan) -> Vec<Point> {
         let s = rule.segment(transfer, &[a.into(), b.into()], length.into());
         let t = |x: f64| 2e-5 * x.abs() + 1e-30;
         let most = alpha(s.depth);
-        Point {
+        FunctionPoint {
             input: [a, b, length, 0.0],
             expected: [s.emission[0], s.emission[1], s.emission[2], s.depth],
             tolerance: [t(most), t(most), t(most), t(s.depth)],
@@ -215,7 +215,7 @@ fn segments() -> Vec<Case> {
 }
 
 /// Positions inside, outside, on samples and on brick faces (inner ones a hair to either side).
-fn sample_points(plan: &FramePlan) -> Vec<Point> {
+fn sample_points(plan: &FramePlan) -> Vec<FunctionPoint> {
     let last = plan.field().last_sample();
     let range = 65535.0;
     let grid = (0..1000u32).map(|i| {
@@ -227,7 +227,7 @@ fn sample_points(plan: &FramePlan) -> Vec<Point> {
         let input = q.as_vec3();
         let value = PlanSamples(plan).around(input.as_dvec3()).map(|c| c.value());
         let (expected, tolerance) = (value.unwrap_or(0.0), 4e-6 * range);
-        Point {
+        FunctionPoint {
             input: [input.x, input.y, input.z, 0.0],
             expected: [expected, if value.is_some() { 1.0 } else { 0.0 }, 0.0, 0.0],
             tolerance: [tolerance, 0.0, 0.0, 0.0],
@@ -278,7 +278,7 @@ fn samples() -> Vec<Case> {
     ]
 }
 
-fn ray_points(plan: &FramePlan, function: ShaderFunction) -> Vec<Point> {
+fn ray_points(plan: &FramePlan, function: ShaderFunction) -> Vec<FunctionPoint> {
     let size = plan.size();
     let scale = plan.domain().extent().length() + plan.rays().anchor.iter().map(|a| a.length()).fold(0.0, f64::max);
     let point = |i: u32| {
@@ -288,7 +288,7 @@ fn ray_points(plan: &FramePlan, function: ShaderFunction) -> Vec<Point> {
             ShaderFunction::RayAnchor => (ray.anchor, ray.t_anchor, 4e-6 * (scale + ray.t_anchor.abs())),
             _ => (ray.direction, 0.0, 4e-6 * ray.direction.length()),
         };
-        Point { input: [x as f32, y as f32, 0.0, 0.0], expected: [v.x, v.y, v.z, w], tolerance: [t; 4] }
+        FunctionPoint { input: [x as f32, y as f32, 0.0, 0.0], expected: [v.x, v.y, v.z, w], tolerance: [t; 4] }
     };
     (0..size.x * size.y).map(point).collect()
 }

@@ -10,6 +10,7 @@ mod placements;
 mod polygons;
 mod real;
 mod setup;
+mod storages;
 mod views;
 
 use super::case::Case;
@@ -24,6 +25,7 @@ pub fn all() -> Vec<Case> {
         placements::cases(),
         polygons::cases(),
         fast::cases(),
+        storages::cases(),
         extremes::cases(),
         real::cases(),
     ]

@@ -8,6 +8,7 @@ use brickfield_core::{Aabb, BrickSide, Camera, Projection, ScalarType, TransferF
 use brickfield_optics::QuadratureRule;
 
 use super::super::case::{Case, Check, Mutant, NoData, Oracle, PictureTest, Shows};
+use super::super::storage::Storage;
 
 /// A scene in the making.
 pub(super) struct Setup {
@@ -17,6 +18,7 @@ pub(super) struct Setup {
     oracle: OracleKind,
     shows: Shows,
     triangles_at_a_time: Option<u32>,
+    storage: Storage,
     scene: Scene,
 }
 
@@ -42,6 +44,7 @@ impl Setup {
             oracle: OracleKind::Volume,
             shows: Shows::Something,
             triangles_at_a_time: None,
+            storage: Storage::default(),
             scene: Scene::new(camera, PICTURE, transfer),
             volume,
         }
@@ -61,6 +64,12 @@ impl Setup {
     /// Draws polygons in batches of so many triangles.
     pub(super) fn triangles_at_a_time(self, n: u32) -> Setup {
         Setup { triangles_at_a_time: Some(n), ..self }
+    }
+
+    /// Stores the samples another way; averages reproduce a linear field.
+    pub(super) fn stored(self, storage: Storage) -> Setup {
+        let oracle = if storage == Storage::Averages { OracleKind::EveryLevel } else { self.oracle };
+        Setup { storage, oracle, ..self }
     }
 
     pub(super) fn rule(self, rule: QuadratureRule) -> Setup {
@@ -130,8 +139,8 @@ impl Setup {
             OracleKind::EveryLevel => Oracle::EveryLevel(volume),
             OracleKind::None => Oracle::None,
         };
-        let Setup { scene, shows, triangles_at_a_time, .. } = self;
-        PictureTest { tree, scene, oracle, shows, triangles_at_a_time }
+        let Setup { scene, shows, triangles_at_a_time, storage, .. } = self;
+        PictureTest { tree, scene, oracle, shows, triangles_at_a_time, storage }
     }
 }
 

@@ -15,15 +15,15 @@ const SHORTEST: i64 = 16;
 /// The rays through a tile of pixels: at any parameter they lie in a box whose sides are spanned by the tile's corners.
 pub(super) struct Beam {
     /// The corners' rays, moved out to either side so far that all rays of the tile lie between.
-    low: [Line; 4],
-    high: [Line; 4],
+    low: [MovingPosition; 4],
+    high: [MovingPosition; 4],
     /// Lines are at `at` here, in world units past the frame's start.
     t_center: f64,
 }
 
 /// A position in sample space that moves.
 #[derive(Clone, Copy, Debug)]
-struct Line {
+struct MovingPosition {
     at: Vec3A,
     /// Samples per world unit.
     change: Vec3A,
@@ -41,7 +41,7 @@ impl Beam {
         let line = |ray: &PlanRay, side: f64| {
             let at = rays.center + ray.at(t_center) + margin * side;
             let change = (ray.direction + swell * side).as_vec3a();
-            Line { at: at.as_vec3a(), change, inverse: change.recip() }
+            MovingPosition { at: at.as_vec3a(), change, inverse: change.recip() }
         };
         let lines = |side| [0, 1, 2, 3].map(|i: usize| line(&corners[i], side));
         Beam { low: lines(-1.0), high: lines(1.0), t_center }
@@ -123,7 +123,7 @@ impl Beam {
     }
 }
 
-impl Line {
+impl MovingPosition {
     #[inline(always)]
     fn position(&self, u: f32) -> Vec3A {
         self.at + self.change * u
@@ -163,7 +163,7 @@ mod tests {
             for (x, y) in columns.clone().flat_map(|x| rows.clone().map(move |y| (x, y))) {
                 for t in [0.0, 3.0, 20.0, 60.0] {
                     let p = (rays.center + rays.ray(x, y).at(t)).as_vec3a();
-                    let at = |line: &Line| line.position((t - beam.t_center) as f32);
+                    let at = |line: &MovingPosition| line.position((t - beam.t_center) as f32);
                     let low = beam.low.iter().map(at).reduce(Vec3A::min).unwrap();
                     let high = beam.high.iter().map(at).reduce(Vec3A::max).unwrap();
                     of_beam = of_beam.max((low - p).max(p - high).max_element());

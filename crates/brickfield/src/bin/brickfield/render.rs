@@ -27,7 +27,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         );
     }
     let mut frame = backend.render(&plan)?;
-    let shown = args.show_bricks.map(|boxes| Shown::new(boxes, &subject, &scene, residency.bricks()));
+    let shown = args.show_bricks.map(|boxes| ShownBricks::new(boxes, &subject, &scene, residency.bricks()));
     if let Some(shown) = &shown {
         frame.image = shown.over(&frame.image, &subject, &scene);
     }
@@ -58,20 +58,20 @@ fn open(args: &RenderArgs) -> Result<Box<dyn Backend>, Failure> {
 }
 
 /// The bricks whose boxes are shown over the picture.
-struct Shown<'a> {
+struct ShownBricks<'a> {
     drawn: &'a [BrickId],
     /// Bricks that are selected but show nothing; `None` if their boxes were not asked for.
     faint: Option<Vec<BrickId>>,
 }
 
-impl<'a> Shown<'a> {
-    fn new(boxes: Boxes, subject: &Subject, scene: &Scene, drawn: &'a [BrickId]) -> Shown<'a> {
+impl<'a> ShownBricks<'a> {
+    fn new(boxes: Boxes, subject: &Subject, scene: &Scene, drawn: &'a [BrickId]) -> ShownBricks<'a> {
         let selected_only = || {
             let selection = select_cut(subject.tree.layout(), subject.tree.grid(), &scene.view(), &scene.detail);
             let drawn: HashSet<BrickId> = drawn.iter().copied().collect();
             selection.drawn().filter(|id| !drawn.contains(id)).collect()
         };
-        Shown { drawn, faint: (boxes == Boxes::All).then(selected_only) }
+        ShownBricks { drawn, faint: (boxes == Boxes::All).then(selected_only) }
     }
 
     fn over(&self, image: &Image, subject: &Subject, scene: &Scene) -> Image {

@@ -7,18 +7,37 @@ use super::brick::{LANES, Lanes, Nodes, Stored};
 use super::classify::Classifier;
 
 /// A plan whose bricks have N samples a side, stored as `S`.
-pub(super) struct Scene<'a, const N: usize, S> {
+pub(super) struct F32Plan<'a, const N: usize, S> {
     pub(super) plan: &'a FramePlan,
     pub(super) transfer: Classifier,
     /// Adds up to a position in sample space from one relative to the frame's centre.
     pub(super) center: DVec3,
     pub(super) last: DVec3,
-    /// From a stored number, less the bias, to a number of the value scale.
+    pub(super) numbers: Numbers,
+    stored: std::marker::PhantomData<S>,
+}
+
+/// From stored numbers to numbers of the value scale: (stored - bias) * gain + offset.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Numbers {
     pub(super) gain: f32,
     pub(super) offset: f32,
     /// The stored number nearest to the first knot; 0 but for 16-bit ones.
     pub(super) bias: f32,
-    stored: std::marker::PhantomData<S>,
+}
+
+impl Numbers {
+    pub(super) fn of(plan: &FramePlan) -> Numbers {
+        let (slots, values) = (plan.field().slots(), plan.value_scale());
+        let decode = slots.decode();
+        let gain = decode.scale / values.unit() / slots.format().unit();
+        let bias = match slots.format() {
+            SampleFormat::Unorm16 => slots.nearest_stored(values.origin()),
+            SampleFormat::Unorm8 | SampleFormat::Float32 => 0.0,
+        };
+        let offset = bias * gain + values.number(decode.offset);
+        Numbers { gain: gain as f32, offset: offset as f32, bias: bias as f32 }
+    }
 }
 
 /// The block of index cells that holds a position, and how far it reaches, in sample space.
@@ -32,23 +51,14 @@ pub(super) struct Block {
     pub(super) high: DVec3,
 }
 
-impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
+impl<'a, const N: usize, S: Stored> F32Plan<'a, N, S> {
     pub(super) fn new(plan: &'a FramePlan) -> Self {
-        let (slots, values) = (plan.field().slots(), plan.value_scale());
-        let decode = slots.decode();
-        let gain = decode.scale / values.unit() / S::FORMAT.unit();
-        let bias = match S::FORMAT {
-            SampleFormat::Unorm16 => slots.nearest_stored(values.origin()),
-            SampleFormat::Unorm8 | SampleFormat::Float32 => 0.0,
-        };
-        Scene {
+        F32Plan {
             plan,
             center: plan.rays().center,
             last: plan.field().last_sample(),
-            gain: gain as f32,
-            offset: (bias * gain + values.number(decode.offset)) as f32,
-            bias: bias as f32,
-            transfer: Classifier::new(plan.transfer(), values),
+            numbers: Numbers::of(plan),
+            transfer: Classifier::new(plan.transfer(), plan.value_scale()),
             stored: std::marker::PhantomData,
         }
     }
@@ -90,8 +100,12 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
         let IndexEntry::Resident { slot, reach } = block.entry else { return None };
         let stride = f64::from(reach.level_of_brick().stride());
         let s = (q.clamp(DVec3::ZERO, self.last) - block.corner) / stride;
-        let nodes =
-            Nodes { origin: s.as_vec3().to_array(), change: [0.0; 3], last: [(N - 1) as f32; 3], bias: self.bias };
+        let nodes = Nodes {
+            origin: s.as_vec3().to_array(),
+            change: [0.0; 3],
+            last: [(N - 1) as f32; 3],
+            bias: self.numbers.bias,
+        };
         Some(self.values(&nodes, self.brick(slot), &[0.0])[0])
     }
 
@@ -100,7 +114,7 @@ impl<'a, const N: usize, S: Stored> Scene<'a, N, S> {
     pub(super) fn values<const L: usize>(&self, nodes: &Nodes, brick: &[u8], at: &[f32; L]) -> [f32; L] {
         let mut values = nodes.stored::<N, S, L>(brick, at);
         for value in &mut values {
-            *value = *value * self.gain + self.offset;
+            *value = *value * self.numbers.gain + self.numbers.offset;
         }
         values
     }

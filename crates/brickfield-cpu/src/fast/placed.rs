@@ -1,0 +1,105 @@
+//! A plan whose slots are of several sizes: each segment by itself, through the table of places.
+
+use std::marker::PhantomData;
+use std::ops::Range;
+
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{Level, Place};
+use brickfield_frame::{Division, FramePlan, PlanRay};
+
+use super::Renderer;
+use super::brick::Stored;
+use super::classify::Classifier;
+use super::f32_plan::Numbers;
+use super::march::{Path, clip, one};
+use super::segment::Ray32;
+use crate::blocks::Blocks;
+
+/// A plan with a table of places, whose samples are stored as `S`.
+pub(super) struct PlacedPlan<'a, S> {
+    plan: &'a FramePlan,
+    transfer: Classifier,
+    numbers: Numbers,
+    stored: PhantomData<S>,
+}
+
+impl<'a, S: Stored> PlacedPlan<'a, S> {
+    pub(super) fn new(plan: &'a FramePlan) -> Self {
+        let transfer = Classifier::new(plan.transfer(), plan.value_scale());
+        PlacedPlan { plan, transfer, numbers: Numbers::of(plan), stored: PhantomData }
+    }
+
+    /// The value that the block around an index cell has at a sample position; `None` if it is empty.
+    fn value_in(&self, cell: UVec3, q: DVec3) -> Option<f32> {
+        let field = self.plan.field();
+        let slot = field.index().at(cell).slot()?;
+        let place = field.place_at(cell)?;
+        let bytes = field.slots().samples(slot)?.bytes();
+        let stored = trilinear(&place, q.clamp(DVec3::ZERO, field.last_sample()), |i| S::number(bytes, i));
+        Some((stored - self.numbers.bias) * self.numbers.gain + self.numbers.offset)
+    }
+}
+
+impl<S: Stored> Renderer for PlacedPlan<'_, S> {
+    fn plan(&self) -> &FramePlan {
+        self.plan
+    }
+
+    fn transfer(&self) -> &Classifier {
+        &self.transfer
+    }
+
+    fn value(&self, q: DVec3) -> Option<f32> {
+        self.value_in(self.plan.field().cell_at(q), q)
+    }
+
+    fn pixel(&self, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
+        let (plan, center) = (self.plan, self.plan.rays().center);
+        let domain = (plan.domain().min - center, plan.domain().max - center);
+        let Some(span) = clip(ray, domain, ray.t_eye) else { return [0.0; 4] };
+        let (mut state, optics) = (Ray32::default(), (plan, &self.transfer));
+        let floor = plan.sampling().transmittance_floor();
+        let has_ended = |state: &Ray32| state.transmittance < floor || state.transmittance == 0.0;
+        match plan.sampling().division() {
+            Division::Ray => {
+                let path = Path::new(plan.sampling(), ray, span, Level(0));
+                for k in runs.iter().flat_map(|run| path.first.max(run.start)..path.end.min(run.end)) {
+                    state.push(one(optics, &path, k, |q| self.value(q)));
+                    if has_ended(&state) {
+                        break;
+                    }
+                }
+            }
+            Division::Brick => {
+                for crossing in Blocks::new(plan, ray, span).filter(|c| c.entry.slot().is_some()) {
+                    let level = plan.field().level_at(crossing.cell);
+                    let path = Path::new(plan.sampling(), ray, crossing.span, level);
+                    for k in path.first..path.end {
+                        state.push(one(optics, &path, k, |q| self.value_in(crossing.cell, q)));
+                    }
+                    if has_ended(&state) {
+                        break;
+                    }
+                }
+            }
+        }
+        state.rgba()
+    }
+}
+
+/// The number between the eight samples around a clamped position: linear along x, then y, then z of the texture.
+fn trilinear(place: &Place, q: DVec3, read: impl Fn(usize) -> f32) -> f32 {
+    let last = place.n - 1;
+    let s = place.axes.to_texture(place.local(q)).clamp(DVec3::ZERO, last.as_dvec3());
+    let i = s.as_uvec3().min(last.saturating_sub(UVec3::ONE));
+    let f = (s - i.as_dvec3()).as_vec3();
+    let n = [place.n.x as usize, place.n.y as usize];
+    // Along an axis with a single sample there is no neighbour.
+    let at = |by: UVec3| {
+        let p = (i + by).min(last);
+        read(p.x as usize + n[0] * (p.y as usize + n[1] * p.z as usize))
+    };
+    let mix = |a: f32, b: f32, f: f32| a + (b - a) * f;
+    let row = |y, z| mix(at(UVec3::new(0, y, z)), at(UVec3::new(1, y, z)), f.x);
+    mix(mix(row(0, 0), row(1, 0), f.y), mix(row(0, 1), row(1, 1), f.y), f.z)
+}
