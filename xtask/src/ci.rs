@@ -1,4 +1,4 @@
-//! What must hold before a merge.
+//! The checks before a merge.
 
 use std::fs;
 use std::process::ExitCode;
@@ -12,10 +12,10 @@ use crate::package::{package, published};
 use crate::readme::xtask_commands;
 use crate::spawn::{Spawn, cargo, root};
 
-/// What README.md must show, and `ci` therefore runs.
+/// The commands that README.md must show, and that `ci` therefore runs.
 const PROMISED: [&str; 2] = ["compare", "test"];
 
-/// The package that asks for features of the others: those are checked without it.
+/// The package that asks for features of the others: the others are checked without it.
 const FRONT_DOOR: &str = "brickfield";
 
 /// A named check.
@@ -28,11 +28,11 @@ struct Step {
 enum StepOutcome {
     Held,
     Failed,
-    /// What it needs is not to be had here. It counts as neither.
+    /// The step needs something that is not to be had here. It counts as neither.
     NotChecked(&'static str),
 }
 
-/// The command: runs all steps, whatever fails, and sums up.
+/// The command: runs all steps, even after a failure, and sums up.
 pub(crate) fn ci() -> Result<ExitCode> {
     let mut lines = vec![];
     let mut all = ExitCode::SUCCESS;

@@ -1,4 +1,4 @@
-//! What the dependencies may be: deny.toml, held by cargo-deny.
+//! The rules for dependencies: deny.toml, held by cargo-deny.
 
 use std::env;
 use std::fs;

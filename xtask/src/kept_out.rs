@@ -1,4 +1,4 @@
-//! Holds each package to what must not come with it, however far away the package that names it.
+//! Holds each package to the packages that it must not bring, however far away the package that names them.
 
 use std::collections::BTreeSet;
 
@@ -29,7 +29,7 @@ const COLORS: &[&str] = &["palette"];
 const COMMANDS: &[&str] = &["clap", "indicatif"];
 const GRAPHICS: &[&str] = &["ash", "naga", "wesl", "wgpu"];
 
-/// What `package` brings that it must not, one line each.
+/// The forbidden packages that `package` brings, one line each.
 pub(crate) fn brought(package: &str) -> Result<Vec<String>> {
     let Some((_, kept_out)) = KEPT_OUT.iter().find(|(name, _)| *name == package) else {
         return Ok(vec![format!("{package} has no row in the table of what is kept out (xtask/src/kept_out.rs)")]);

@@ -1,4 +1,4 @@
-//! Holds the workspace's packages to the arrows of ARCHITECTURE.md, and to what must not come with them.
+//! Holds the workspace's packages to the arrows of ARCHITECTURE.md, and to the packages that they must not bring.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -102,7 +102,7 @@ fn violations(packages: &[Package], table: &BTreeSet<String>) -> Vec<String> {
     edges.chain(folders).chain(unlisted).chain(gone).collect()
 }
 
-/// What is wrong with one dependency.
+/// The fault of one dependency, if it has one.
 fn edge(package: &Package, dependency: &str, workspace: &BTreeSet<String>) -> Option<String> {
     let name = &package.name;
     if let Some((_, owner)) = OWNED.iter().find(|(d, owner)| *d == dependency && owner != name) {

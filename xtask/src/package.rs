@@ -7,10 +7,10 @@ use serde_json::Value;
 
 use crate::spawn::{Spawn, cargo, metadata};
 
-/// What a registry shows of a package. Licence and readme are also files, which go with it.
+/// The fields of a package that a registry shows. Licence and readme are also files, which go with it.
 const FIELDS: [&str; 6] = ["description", "license", "readme", "documentation", "keywords", "categories"];
 
-/// What lies in every package.
+/// The files of every package.
 const FILES: [&str; 3] = ["LICENSE-APACHE", "LICENSE-MIT", "README.md"];
 
 /// The command: packs every publishable crate, builds none. `cargo package --workspace` builds them, too.
@@ -42,7 +42,7 @@ fn pack(arguments: &[&str]) -> Spawn {
     cargo("package").arg("--allow-dirty").args(arguments)
 }
 
-/// The packages that may be published, and those that may not.
+/// The packages that may be published, and the packages that may not.
 fn packages(metadata: &str) -> Result<(Vec<Value>, Vec<Value>)> {
     let mut metadata: Value = serde_json::from_str(metadata).context("cargo metadata is not JSON")?;
     let Value::Array(all) = metadata["packages"].take() else { anyhow::bail!("cargo metadata lists no packages") };

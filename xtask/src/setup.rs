@@ -1,4 +1,4 @@
-//! What a machine needs beyond Rust, what of it is missing, and how it is installed.
+//! The requirements of a machine beyond Rust, the missing ones among them, and how they are installed.
 
 use std::env;
 use std::fs;
@@ -160,7 +160,7 @@ impl Need {
     }
 }
 
-/// The commands that install what is missing.
+/// The commands that install the missing requirements.
 fn commands(missing: &[&Need]) -> Vec<Vec<String>> {
     let words = |fixed: &[&str], names: &[&str]| fixed.iter().chain(names).map(|w| (*w).to_owned()).collect::<Vec<_>>();
     let packages: Vec<&str> = missing.iter().filter_map(|n| n.debian()).collect();

@@ -65,7 +65,7 @@ impl Spawn {
         Ok(if status.success() { ExitCode::SUCCESS } else { ExitCode::from(code.unwrap_or(1).max(1)) })
     }
 
-    /// What the command writes to its standard output.
+    /// The text that the command writes to its standard output.
     pub(crate) fn output(mut self) -> Result<String> {
         let output = self.0.output().with_context(|| format!("cannot start {}", self.line()))?;
         if !output.status.success() {
@@ -101,12 +101,12 @@ impl Tool {
     }
 }
 
-/// What cargo says about the workspace, as JSON.
+/// The workspace's metadata, as JSON from cargo.
 pub(crate) fn metadata() -> Result<String> {
     cargo("metadata").args(["--no-deps", "--format-version", "1"]).output()
 }
 
-/// The folder of real volumes: what the environment names, or in CI the one beside the checkout.
+/// The folder of real volumes: the one that the environment names, or in CI the one beside the checkout.
 fn data_folder() -> Option<PathBuf> {
     if let Some(data) = env::var_os("BRICKFIELD_DATA").filter(|d| !d.is_empty()) {
         return std::path::absolute(data).ok();

@@ -1,4 +1,4 @@
-//! The backend: a device, what it holds, and how a plan is replayed on it.
+//! The backend: a device, the resources on it, and how a plan is replayed.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -69,7 +69,7 @@ impl AshBackend {
         self.variants = Variants::new(library);
     }
 
-    /// What the validation layer says, as a log that outlives the backend, to see what is said about its end.
+    /// The messages of the validation layer, as a log that outlives the backend: messages about its end are in it, too.
     pub fn validation_log(&self) -> ValidationLog {
         self.device.instance().log().clone()
     }

@@ -1,4 +1,4 @@
-//! What can go wrong before the first frame, and how failed Vulkan calls become errors.
+//! The errors before the first frame, and how failed Vulkan calls become errors.
 
 use ash::vk;
 use brickfield_frame::RenderError;
@@ -48,7 +48,7 @@ impl<T> OfCall<T> for Result<T, vk::Result> {
 }
 
 impl FailedCall {
-    /// The error of work on the device: a lost device is told by what was being done.
+    /// The error of work on the device: a lost device is reported with the work that was being done.
     pub(crate) fn while_doing(self, doing: &'static str) -> RenderError {
         match self.code {
             vk::Result::ERROR_DEVICE_LOST => RenderError::DeviceLost { doing },

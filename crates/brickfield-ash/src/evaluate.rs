@@ -27,7 +27,7 @@ impl AshBackend {
         Ok(shader_outputs(plan, function, &outputs))
     }
 
-    /// Appends what the function makes of `inputs` to `outputs`.
+    /// Appends the function's values at `inputs` to `outputs`.
     fn evaluate_chunk(
         &mut self,
         variant: Variant,

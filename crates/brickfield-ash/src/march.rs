@@ -10,7 +10,7 @@ use brickfield_frame::{FrameUniforms, Pass, RenderError, Target};
 use crate::staging::Staging;
 use crate::vulkan::{BoundPipeline, Buffer, Device, ImageBox, Queue, Use, VulkanImage};
 
-/// Bytes of a pixel, and of what a ray has seen.
+/// Bytes of a pixel, and of a ray's emission and depth.
 pub(crate) const PIXEL_BYTES: usize = size_of::<[f32; 4]>();
 
 /// How long rendering took, in milliseconds.
@@ -48,7 +48,7 @@ pub(crate) fn march(
         let pass_ms = queue.run_timed("rendering", |recorder| {
             recorder.update(buffer, bytemuck::bytes_of(&uniforms.in_pass(pass)));
             recorder.barrier(Use::CopyTarget, Use::ShaderRead);
-            // What the pass before left of its rays.
+            // The pass before has written the emission and depth of its rays.
             recorder.barrier(Use::ShaderWrite, Use::ShaderWrite);
             recorder.image_barrier(picture, before, Use::ShaderWrite);
             recorder.dispatch(bound, groups);

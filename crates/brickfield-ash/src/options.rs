@@ -44,7 +44,7 @@ pub enum Validation {
     /// No.
     #[default]
     Off,
-    /// Yes; what it says is kept in a [`ValidationLog`](crate::ValidationLog).
+    /// Yes; its messages are kept in a [`ValidationLog`](crate::ValidationLog).
     On,
 }
 
@@ -57,7 +57,7 @@ pub struct AdapterSummary {
     pub name: String,
     /// The driver's name and version.
     pub driver: String,
-    /// What it is.
+    /// The adapter's kind.
     pub kind: AdapterKind,
 }
 

@@ -68,7 +68,7 @@ impl Polygons {
             recorder.image_barrier(&canvas.image, Use::Nothing, Use::CopyTarget);
             recorder.clear(&canvas.image);
             recorder.image_barrier(&canvas.image, Use::CopyTarget, Use::Canvas);
-            // What was brought to the device was brought for shaders that compute.
+            // Resources were brought to the device for compute shaders.
             recorder.barrier(Use::ShaderRead, Use::DrawRead);
         })?;
         let (Some(corners), Some(indices)) = (self.corners.buffer(), self.indices.buffer()) else {

@@ -1,4 +1,4 @@
-//! What stays on the device: the contents that plans bring, by name.
+//! The resources that stay on the device: the contents of plans, by name.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -32,7 +32,7 @@ pub(crate) struct Reused {
     held: HeldChunks,
 }
 
-/// What a plan has brought.
+/// The numbers of a plan, and the bytes that were brought to the device for it.
 pub(crate) struct Brought {
     /// The frame's numbers, as for a single pass.
     pub(crate) uniforms: FrameUniforms,
@@ -56,7 +56,7 @@ impl Resources {
         self.entry(resource).reserve(&device, n_bytes)
     }
 
-    /// Makes room for what `n_pixels` rays saw in one pass, and the next must know.
+    /// Makes room for the emission and depth of `n_pixels` rays, which one pass hands to the next.
     pub(crate) fn reserve_rays(&mut self, n_pixels: u64) -> Result<(), RenderError> {
         self.reserve(Resource::SeenBefore, n_pixels as usize * PIXEL_BYTES).map(drop)
     }
@@ -74,7 +74,7 @@ impl Resources {
         self.buffers.entry(resource).or_insert_with(|| Reused::new(resource.name(), usage))
     }
 
-    /// Brings to the device what `pipeline` reads of `plan`, as far as it is not there: numbers and lists in one submit.
+    /// Brings to the device the contents of `plan` that `pipeline` reads and the device lacks: numbers and lists in one submit.
     pub(crate) fn bring(
         &mut self,
         queue: &mut Queue,
@@ -148,7 +148,7 @@ impl Resources {
         shape.filter(|s| Some(s.side) == side).unwrap_or(AtlasShape::least(side.unwrap_or(BrickSide::S16)))
     }
 
-    /// What a shader's binding stands for.
+    /// The buffer, texture or sampler of a shader's binding.
     pub(crate) fn bindable(&self, binding: &Binding) -> Option<Bindable<'_>> {
         match binding.kind {
             BindingKind::Uniform | BindingKind::StorageRead | BindingKind::StorageReadWrite => {
@@ -186,7 +186,7 @@ impl Reused {
         }
     }
 
-    /// Makes room for chunks beside those that are there; a buffer that must grow gets a quarter more than it had.
+    /// Makes room for chunks, and keeps the chunks that are there; a buffer that must grow gets a quarter more than it had.
     fn make_room(&mut self, device: &Arc<Device>, queue: &mut Queue, content: &dyn Chunked) -> Result<(), RenderError> {
         let n_bytes = content.n_bytes();
         let Some(old) = self.buffer.take_if(|b| b.n_bytes() < n_bytes) else {

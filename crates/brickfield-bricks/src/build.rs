@@ -82,7 +82,7 @@ pub fn build_tree_observed(
     Ok(BrickTree { id, layout, grid, downsampling: options.downsampling, bins, scalar, levels })
 }
 
-/// What all levels are built with.
+/// The layout and options that all levels are built with.
 struct Job<'a> {
     layout: BrickLayout,
     downsampling: Downsampling,

@@ -8,7 +8,7 @@ use crate::downsample::Dense;
 use crate::sample::BrickScalar;
 use crate::tally::Tally;
 
-/// Copies the brick's samples; those beyond the level's border replicate the border sample.
+/// Copies the brick's samples; samples beyond the level's border replicate the border sample.
 pub(crate) fn copy_brick<T: BrickScalar>(source: Dense<'_, T>, layout: &BrickLayout, id: BrickId, out: &mut [T]) {
     let n = layout.side().n_samples() as usize;
     let [x, y, z] = first_sample(layout, id).to_array().map(|i| i as usize);

@@ -1,4 +1,4 @@
-//! What a tree takes: stored, shared and padding bytes.
+//! The memory of a tree: stored, shared and padding bytes.
 
 use brickfield_core::glam::U64Vec3;
 use brickfield_core::{BrickLayout, Level, ScalarType};
@@ -30,7 +30,7 @@ pub struct TreeMemory {
     pub total: LevelMemory,
 }
 
-/// What a tree over `layout` takes, without building it.
+/// The memory of a tree over `layout`, without building it.
 ///
 /// While it is built, [`build_tree`](crate::build_tree) also holds two neighbouring levels, not level 0, without bricks.
 pub fn tree_memory(layout: &BrickLayout, scalar: ScalarType) -> TreeMemory {

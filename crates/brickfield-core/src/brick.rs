@@ -103,12 +103,12 @@ impl Cut {
 
     /// The cut that a depth-first descent from the root makes: a cut by construction, so nothing is left to check.
     ///
-    /// `visit` sees a brick and what its parent handed down; it returns what to hand to the children, or `None` to
+    /// `visit` sees a brick and the state that its parent handed down; it returns the state for the children, or `None` to
     /// take the brick itself. A brick of level 0 is taken whatever `visit` returns. The cut holds the bricks in the
     /// order in which they are taken.
     pub fn descend<S: Copy>(layout: BrickLayout, state: S, mut visit: impl FnMut(BrickId, S) -> Option<S>) -> Cut {
         let mut bricks = Vec::new();
-        // The root is the only child of a parent that there is none of.
+        // The root is treated as the only child of a parent that does not exist.
         take_children(&layout, layout.root().parent(), state, &mut visit, &mut bricks);
         Cut { layout, bricks }
     }

@@ -38,7 +38,7 @@ pub enum GridError {
 const AXES: [char; 3] = ['x', 'y', 'z'];
 
 impl Grid {
-    /// A grid from what files state: the world position of the **first sample** (the centre of voxel 0).
+    /// A grid from the world position of the **first sample** (the centre of voxel 0), as files state it.
     ///
     /// `direction` holds one column per index axis; the columns are normalised, the lengths are in `spacing`.
     ///

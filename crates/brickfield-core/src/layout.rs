@@ -71,7 +71,7 @@ impl fmt::Display for BrickSide {
 pub struct BrickLayout {
     dims: UVec3,
     side: BrickSide,
-    /// Of level 0. No division is left to the descents that ask for those of a level.
+    /// Bricks of level 0 along x, y, z. The count is stored, so that a descent never divides.
     n_bricks: UVec3,
     n_levels: u8,
 }
@@ -129,7 +129,7 @@ impl BrickLayout {
         })
     }
 
-    /// The position of a brick among those of its level, x fastest.
+    /// The position of a brick among the bricks of its level, x fastest.
     pub fn ordinal(&self, id: BrickId) -> usize {
         let n = self.n_bricks(id.level);
         let (x, y, z) = (id.coords.x as usize, id.coords.y as usize, id.coords.z as usize);

@@ -5,7 +5,7 @@ use crate::ValueRange;
 /// Straight (not premultiplied) linear RGB.
 pub type LinearRgb = [f64; 3];
 
-/// What a point of the medium does: extinction per world unit, and the colour it emits per unit of extinction.
+/// The optical properties at a point of the medium: extinction per world unit, and the colour emitted per unit of extinction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[allow(missing_docs)]
 pub struct Optics {

@@ -4,7 +4,7 @@ use crate::{Grid, Scalar, ScalarType, Voxels, with_voxels};
 
 /// A scalar volume: voxels in their native type, and where they lie.
 ///
-/// All values are finite: [`Volume::new`] replaces what is not, and counts it.
+/// All values are finite: [`Volume::new`] replaces values that are not, and counts them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volume {
     grid: Grid,
@@ -100,7 +100,7 @@ impl Volume {
         self.range
     }
 
-    /// What was not finite in the voxels handed to [`Volume::new`].
+    /// The count of voxels that were not finite when handed to [`Volume::new`].
     pub fn non_finite(&self) -> NonFinite {
         self.non_finite
     }

@@ -9,7 +9,7 @@ use brickfield_frame::{FramePlan, IndexEntry, PlanRay};
 pub(crate) struct Crossing {
     /// An index cell of the block.
     pub(crate) cell: UVec3,
-    /// What the index says of it.
+    /// The block's entry of the index.
     pub(crate) entry: IndexEntry,
     /// Parameters of the ray; not empty.
     pub(crate) span: Span,

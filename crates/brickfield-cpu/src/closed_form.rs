@@ -48,7 +48,7 @@ pub fn layers(layers: &[(Optics, f64)]) -> [f64; 4] {
     ray.rgba()
 }
 
-/// Premultiplied `front` over `back`: what a ray split at any point must give for the whole.
+/// Premultiplied `front` over `back`: a ray that is split at any point must give this for the whole.
 pub fn over(front: [f64; 4], back: [f64; 4]) -> [f64; 4] {
     std::array::from_fn(|c| front[c] + (1.0 - front[3]) * back[c])
 }

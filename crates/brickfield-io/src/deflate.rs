@@ -1,4 +1,4 @@
-//! zlib and gzip streams, bounded by what deflate can expand.
+//! zlib and gzip streams, bounded by the greatest expansion of deflate.
 
 use std::io::{self, BufRead, ErrorKind, Read};
 
@@ -11,7 +11,7 @@ use crate::{Note, ReadError};
 /// Deflate cannot expand by more than this (258 bytes from 2 bits).
 const MAX_RATIO: u128 = 1032;
 
-/// Holds a header's claim against what so few compressed bytes can hold at all, before allocation.
+/// Holds a header's claim against the most that so few compressed bytes can hold, before allocation.
 pub(crate) fn check_ratio(what: &str, n_compressed_bytes: u64, expected_bytes: u128) -> Result<(), ReadError> {
     let max_bytes = u128::from(n_compressed_bytes) * MAX_RATIO;
     if expected_bytes > max_bytes {
@@ -29,7 +29,7 @@ pub(crate) fn inflate<'a, R: BufRead + ?Sized>(source: &'a mut R) -> io::Result<
     })
 }
 
-/// The members of a gzip stream, one after the other. What is behind them is no part of it, as `gzip` has it.
+/// The members of a gzip stream, one after the other. Bytes behind them are no part of it, as `gzip` has it.
 struct Members<R: BufRead> {
     /// `None` after the last one.
     member: Option<GzDecoder<R>>,
@@ -55,7 +55,7 @@ impl<R: BufRead> Read for Members<R> {
 /// A decoder whose faults are [`Damage`].
 pub(crate) struct Unpacked<R>(pub(crate) R);
 
-/// A decoder that fails drops what it has unpacked in that call; with shorter calls less is missing from the count.
+/// A decoder that fails drops the bytes that it has unpacked in that call; with shorter calls less is missing from the count.
 const MAX_READ_BYTES: usize = 1 << 15;
 
 impl<R: Read> Read for Unpacked<R> {
@@ -65,7 +65,7 @@ impl<R: Read> Read for Unpacked<R> {
     }
 }
 
-/// What a decoder means: `flate2` reports corrupt data as invalid input.
+/// The meaning of a decoder's error: `flate2` reports corrupt data as invalid input.
 pub(crate) fn damage(fault: io::Error) -> io::Error {
     let is_of_source = fault.get_ref().is_some_and(|e| e.is::<Damage>());
     match fault.kind() {

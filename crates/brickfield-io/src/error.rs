@@ -24,9 +24,9 @@ impl OpenError {
     }
 }
 
-/// What is wrong with the bytes of a volume file.
+/// The fault of the bytes of a volume file.
 ///
-/// The text is one line, whatever the file holds: values from files are escaped and shortened.
+/// The text is one line for any file: values from files are escaped and shortened.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)]
@@ -77,7 +77,7 @@ pub enum ReadError {
     Volume(#[from] VolumeError),
 }
 
-/// What is wrong with packed data after the bytes that could be unpacked.
+/// The fault of packed data after the bytes that could be unpacked.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)]
@@ -213,7 +213,7 @@ pub(crate) fn check_length(what: &str, n_bytes: u64, expected_bytes: u128) -> Re
     Ok(())
 }
 
-/// A number and what it counts: "1 byte", "2 bytes".
+/// A number and its noun: "1 byte", "2 bytes".
 pub(crate) fn counted(n: impl fmt::Display, one: &str, many: &str) -> String {
     let n = n.to_string();
     let noun = if n == "1" { one } else { many };

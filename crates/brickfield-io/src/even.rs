@@ -29,7 +29,7 @@ impl Opened {
     }
 }
 
-/// The even volume of slices at `positions`, if there can be one, and what to say of it.
+/// The even volume of slices at `positions`, if there can be one, and the note about it.
 fn resampled(volume: &Volume, positions: &[f64], limits: &Limits) -> Option<(Volume, Note)> {
     let dims = volume.grid().dims();
     let steps = steps(positions).filter(|steps| steps.len() + 1 == dims.z as usize)?;
@@ -64,7 +64,7 @@ fn even_grid(grid: &Grid, dims: UVec3, step: f64) -> Option<Grid> {
     Grid::from_first_sample(dims, spacing, first_sample, map.matrix3).ok()
 }
 
-/// Slices at multiples of `step`, mixed from those at `positions`; `None` if there is no memory for them.
+/// Slices at multiples of `step`, mixed from the slices at `positions`; `None` if there is no memory for them.
 fn even<T: Scalar>(voxels: &[T], shape: &CheckedShape, positions: &[f64], step: f64) -> Option<Voxels> {
     let mut out = with_room(shape.n_voxels()).ok()?;
     let n_slice = voxels.len() / positions.len();

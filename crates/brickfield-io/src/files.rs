@@ -48,7 +48,7 @@ impl DataFiles for NoFiles {
     }
 }
 
-/// Opens a file, but no pipe and no device: those could block or never end.
+/// Opens a file, but no pipe and no device: a pipe could block, a device never end.
 pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
     if !path.metadata()?.is_file() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));

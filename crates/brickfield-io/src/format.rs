@@ -33,7 +33,7 @@ impl Format {
         Format::Raw,
     ];
 
-    /// What people call it.
+    /// The format's common name.
     pub const fn name(self) -> &'static str {
         match self {
             Format::Nrrd => "NRRD",

@@ -5,7 +5,7 @@ use brickfield_core::glam::UVec3;
 
 use crate::ReadError;
 
-/// What a reader may allocate.
+/// The most that a reader may allocate.
 ///
 /// A header is held against the limit before any voxel is allocated, and no decoder expands more than the header
 /// claims. Peak memory is the volume, one more copy while values are rescaled or bytes unpacked, and a few MiB.

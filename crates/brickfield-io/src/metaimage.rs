@@ -27,7 +27,7 @@ use crate::{ByteOrder, DataFiles, Format, Limits, Note, Opened, ReadError, World
 /// ITK takes it to be. `Offset` is the first sample's centre; row i of TransformMatrix is the direction of axis i.
 ///
 /// # Errors
-/// What [`ReadError`] lists: a header that is wrong, unsupported or beyond the limits; data that are missing.
+/// As [`ReadError`] lists them: a header that is wrong, unsupported or beyond the limits; data that are missing.
 pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, limits: &Limits) -> Result<Opened, ReadError> {
     read_from(&mut input, files, limits)
 }

@@ -28,7 +28,7 @@ const HEADER_BYTES: usize = 348;
 /// negated. Rescaled values become f32, or f64 if the stored type is u32, i32 or f64.
 ///
 /// # Errors
-/// What [`ReadError`] lists: a header that is wrong, unsupported or beyond the limits; data that are missing.
+/// As [`ReadError`] lists them: a header that is wrong, unsupported or beyond the limits; data that are missing.
 pub fn read(
     mut input: impl BufRead + Seek,
     stem: &str,

@@ -1,4 +1,4 @@
-//! What a reader noticed and the user ought to know, though the volume could be read.
+//! Notes of a reader that the user ought to know, though the volume could be read.
 
 use std::fmt;
 

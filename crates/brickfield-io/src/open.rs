@@ -1,4 +1,4 @@
-//! Opening a path, whatever format it is in.
+//! Opening a path, in any format.
 
 use std::fs::File;
 use std::io::{self, BufReader, Seek};
@@ -24,7 +24,7 @@ pub fn open(path: &Path, limits: &Limits) -> Result<Opened, OpenError> {
     opened.map_err(|fault| OpenError::new(path, fault))
 }
 
-/// Opens raw voxels of a given shape. A file that begins as those of a known format do gets a note.
+/// Opens raw voxels of a given shape. A file that begins like a file of a known format gets a note.
 ///
 /// # Errors
 /// One line that names the path, what is wrong, the value and the bound.

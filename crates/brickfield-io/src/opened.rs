@@ -1,10 +1,10 @@
-//! What a reader returns.
+//! The result of a reader.
 
 use brickfield_core::{Grid, Volume, Voxels};
 
 use crate::{Format, Note, ReadError};
 
-/// A volume from a file, and what the file says about it.
+/// A volume from a file, and the file's statements about it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Opened {
     /// The volume, in the file's scalar type unless its values had to be rescaled.
@@ -15,7 +15,7 @@ pub struct Opened {
     pub frame: WorldFrame,
     /// The unit of world lengths as the file names it, if it does: "mm", "micrometer".
     pub unit: Option<String>,
-    /// What the user ought to know.
+    /// Notes that the user ought to know.
     pub notes: Vec<Note>,
 }
 

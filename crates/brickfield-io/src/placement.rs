@@ -1,4 +1,4 @@
-//! From what files state about space to a [`Grid`].
+//! From a file's statements about space to a [`Grid`].
 
 use brickfield_core::Grid;
 use brickfield_core::glam::{DMat3, DVec3, UVec3};
@@ -17,7 +17,7 @@ impl GridPlacement {
         GridPlacement { first_sample, steps: DMat3::from_diagonal(spacing) }
     }
 
-    /// Up to three axis steps; missing ones are made up, of length 1 and orthogonal to those given.
+    /// Up to three axis steps; missing ones are made up, of length 1 and orthogonal to the given ones.
     pub(crate) fn from_axes(axes: &[DVec3], first_sample: DVec3) -> GridPlacement {
         let steps = match *axes {
             [] => DMat3::IDENTITY,

@@ -14,7 +14,7 @@ use crate::save::{SaveError, save_atomically, write_samples};
 use crate::stored::{ByteSkip, DataFile, Encoding, StoredSamples};
 use crate::{ByteOrder, Format, Limits, Opened, ReadError};
 
-/// What has to be known about a raw file.
+/// The numbers that a raw file does not state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RawSpec {
     /// Voxels along x (fastest), y, z.
@@ -39,7 +39,7 @@ impl RawSpec {
 /// Reads raw voxels. The outer corner of the first voxel is the world's origin.
 ///
 /// # Errors
-/// What [`ReadError`] lists: a shape beyond the limits or the file, a spacing that is not above 0.
+/// As [`ReadError`] lists them: a shape beyond the limits or the file, a spacing that is not above 0.
 pub fn read(mut input: impl BufRead + Seek, spec: &RawSpec, limits: &Limits) -> Result<Opened, ReadError> {
     let shape = CheckedShape::claim(spec.dims.to_array().map(u64::from), spec.scalar, limits)?;
     let grid = GridPlacement::axis_aligned(spec.spacing, 0.5 * spec.spacing).grid(shape.dims)?;

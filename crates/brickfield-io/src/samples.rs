@@ -116,7 +116,7 @@ pub(crate) fn fill(reader: &mut dyn Read, buffer: &mut [u8]) -> std::io::Result<
     Ok(n)
 }
 
-/// Reads until the buffer is full or the source ends; what has been read by the time of a fault is counted as well.
+/// Reads until the buffer is full or the source ends; bytes that were read before a fault are counted as well.
 fn fill_counted(reader: &mut dyn Read, buffer: &mut [u8], n: &mut usize) -> std::io::Result<()> {
     while *n < buffer.len() {
         match reader.read(&mut buffer[*n..]) {

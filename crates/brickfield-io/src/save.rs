@@ -7,7 +7,7 @@ use brickfield_core::{Voxels, with_voxels};
 
 use crate::ByteOrder;
 
-/// A file that could not be written. What was there before is as it was.
+/// A file that could not be written. An earlier file of its name is unchanged.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: cannot write: {source}", path.display())]
 #[allow(missing_docs)]
@@ -34,7 +34,7 @@ fn save_renaming(
     };
     let mut builder = tempfile::Builder::new();
     builder.prefix(".brickfield-");
-    // What an ordinary file gets (before the umask), not the private mode of temporary files.
+    // The mode of an ordinary file (before the umask), not the private mode of temporary files.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut file = builder.tempfile_in(folder)?;

@@ -21,7 +21,7 @@ pub(crate) enum Encoding {
     Deflate,
 }
 
-/// What precedes the samples in each data file.
+/// The bytes before the samples in each data file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ByteSkip {
     Bytes(u64),

@@ -7,7 +7,7 @@ use brickfield_core::{Level, Projection, WorldPos};
 
 use crate::{Answer, Filter, Tile, View};
 
-/// When a tile is fine enough to be drawn: what a scene asks for.
+/// When a tile is fine enough to be drawn, as a scene states it.
 ///
 /// Tiles of level 0 are: there is nothing finer. With NaN no others are.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +64,7 @@ impl Criterion {
     }
 }
 
-/// A criterion, with what it needs of a view.
+/// A criterion, with the numbers of a view that it needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CriterionInView(Law);
 

@@ -1,11 +1,11 @@
-//! Filters: what they say to a tile, and how several make one.
+//! Filters: their answers to a tile, and how several make one.
 
 use crate::Tile;
 
-/// What a filter says to a tile (LaMar, Hamann and Joy 1999, section 4.1).
+/// A filter's answer to a tile (LaMar, Hamann and Joy 1999, section 4.1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Answer {
-    /// Neither this tile nor those below it are needed.
+    /// Neither this tile nor the tiles below it are needed.
     Ignore,
     /// The tile satisfies the filter: draw it.
     Render,
@@ -16,7 +16,7 @@ pub enum Answer {
 impl Answer {
     /// The answer of two filters that must both be satisfied.
     ///
-    /// What one ignores is ignored; of the rest, what one finds too coarse is too coarse. Commutative, associative, and
+    /// A tile that one ignores is ignored; any other tile that one finds too coarse is too coarse. Commutative, associative, and
     /// [`Answer::Render`] is its unit.
     pub fn and(self, other: Answer) -> Answer {
         match (self, other) {
@@ -32,11 +32,11 @@ impl Answer {
 /// A closure `|tile: &Tile<'_>| -> Answer` is a filter, and so are a [`Frustum`](crate::Frustum) and a
 /// [`Criterion`](crate::Criterion) in a view. [`and`](Filter::and) makes one of two.
 pub trait Filter {
-    /// What is known of a tile from the answer to its parent, and need not be found out again; `()` if nothing is.
-    /// The default is what is known of the root.
+    /// Knowledge of a tile from the answer to its parent, which need not be found out again; `()` if there is none.
+    /// The default is the knowledge of the root.
     type Known: Copy + Default;
 
-    /// The answer to a tile, and what is known of its children.
+    /// The answer to a tile, and the knowledge of its children.
     fn answer_knowing(&self, tile: &Tile<'_>, known: Self::Known) -> (Answer, Self::Known);
 
     /// The answer to a tile of whose ancestors nothing is known.
@@ -55,7 +55,7 @@ pub trait Filter {
     }
 }
 
-/// Two filters that must both be satisfied: what [`Filter::and`] makes.
+/// Two filters that must both be satisfied: the result of [`Filter::and`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct And<A, B>(A, B);
 

@@ -15,14 +15,14 @@ const TOLERANCE: f64 = 1e-12;
 /// Bricks are boxes in index space whatever the grid's direction and spacing, so that one test serves sheared,
 /// anisotropic and mirrored grids.
 ///
-/// As a filter it ignores what lies outside and renders the rest. It is conservative: a brick that a ray reaches is never
+/// As a filter it ignores bricks outside and renders all others. It is conservative: a brick that a ray reaches is never
 /// outside; one near an edge of the frustum may lie outside and be rendered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frustum {
     planes: [HalfSpace; N_PLANES],
 }
 
-/// A set of a frustum's planes: those that a brick has not been found to lie wholly inside of. All, by default.
+/// The set of a frustum's planes of which a brick has not been found to lie wholly inside. All, by default.
 ///
 /// The children of a brick need to be tested against no others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

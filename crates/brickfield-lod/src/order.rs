@@ -5,7 +5,7 @@ use brickfield_core::{BrickId, BrickLayout, Camera, Grid, Level, Projection, Wor
 
 /// The order in which to draw bricks so that none lies behind one that is drawn before it: indices into `bricks`.
 ///
-/// LaMar, Hamann and Joy 1999, section 4.1. `bricks` are disjoint bricks of any levels, in any order: those of a cut, or
+/// LaMar, Hamann and Joy 1999, section 4.1. `bricks` are disjoint bricks of any levels, in any order: the bricks of a cut, or
 /// some of them. From the root down, each node's bricks are parted among its children, the far ones first. A ray to the
 /// eye crosses each of the three planes between children at most once, toward the eye's side. An orthographic picture has
 /// one order for the whole tree, given by the signs of the view direction; a perspective one has its own at every node,

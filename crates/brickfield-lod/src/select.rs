@@ -12,11 +12,11 @@ pub struct View {
     pub camera: Camera,
     /// Pixels of the picture along x and y.
     pub size: UVec2,
-    /// What happens to bricks that no ray can reach.
+    /// Whether bricks that no ray can reach are ignored.
     pub culling: Culling,
 }
 
-/// What happens to bricks that no ray of the picture can reach.
+/// Whether bricks that no ray of the picture can reach are ignored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Culling {
     /// They are ignored, at the coarsest level where the whole brick is out of reach.

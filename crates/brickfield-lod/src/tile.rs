@@ -8,7 +8,7 @@ use brickfield_core::{Aabb, BrickId, BrickLayout, Grid, WorldPos};
 /// The tile ends at the first and last samples, not at the half voxels beyond them. It has no extent along an axis of
 /// one sample, so that a slice is measured in two dimensions. In the world it is a parallelepiped.
 ///
-/// A tile is a name and two references; what it is asked for is measured when it is asked for.
+/// A tile is a name and two references; every measure of it is computed when it is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tile<'a> {
     layout: &'a BrickLayout,
@@ -96,7 +96,7 @@ impl<'a> Tile<'a> {
     }
 
     /// The least distance of a point of the tile from the plane through `eye` across the unit vector `forward`, in
-    /// world units; negative for what lies behind.
+    /// world units; negative for points behind.
     #[inline]
     pub fn least_depth_world(&self, eye: WorldPos, forward: DVec3) -> f64 {
         let first = self.world(self.sample_box().min).0;

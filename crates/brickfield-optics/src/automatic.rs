@@ -9,7 +9,7 @@ use crate::histogram::{Classes, VolumeHistogram, otsu_cuts, triangle_foot};
 /// 1. *Padding*, a lone value at either end of the range, is left out.
 /// 2. *Background* is the fullest bin of the lower of two classes (Otsu 1979). Its noise ends at the foot of the slope above
 ///    it (triangle method; Zack, Rogers and Latt 1977) and half as far again.
-/// 3. *Materials* are up to three classes of what is brighter (Otsu again). Extinction is exactly 0 up to `EDGE` of
+/// 3. *Materials* are up to three classes of brighter values (Otsu again). Extinction is exactly 0 up to `EDGE` of
 ///    the way from the background to the first material's median and never ends within the noise, then rises from
 ///    median to median; constant beyond the last.
 /// 4. *Extinction* gives each material an optical depth over the mean length of a ray in it (its volume over the
@@ -17,7 +17,7 @@ use crate::histogram::{Classes, VolumeHistogram, otsu_cuts, triangle_foot};
 ///    brightest nearly opaque and almost white.
 ///
 /// Deterministic; at most four passes over the voxels. A constant volume is a translucent grey block. Not for volumes
-/// whose background is their brightest value: those want a file.
+/// whose background is their brightest value: such volumes need a transfer-function file.
 pub fn automatic(volume: &Volume) -> TransferFunction {
     let histogram = VolumeHistogram::without_padding(volume);
     let knots = if histogram.is_constant() {

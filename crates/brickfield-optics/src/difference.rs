@@ -22,7 +22,7 @@ pub enum ColorMetric {
 pub struct ColorDifferences {
     /// The mean; 0 for pictures without pixels.
     pub mean: f64,
-    /// The 95th percentile: the least difference that is not below those of 95 % of the pixels (nearest rank).
+    /// The 95th percentile: the least difference that is not below the differences of 95 % of the pixels (nearest rank).
     pub percentile_95: f64,
     /// The greatest difference.
     pub max: f64,

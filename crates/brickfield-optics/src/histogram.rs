@@ -2,7 +2,7 @@
 
 use brickfield_core::{Scalar, ScalarType, ValueRange, Volume, with_voxels};
 
-/// Counts of data values in bins of one width; what lies outside the range is not counted.
+/// Counts of data values in bins of one width; values outside the range are not counted.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct VolumeHistogram {
     range: ValueRange,
@@ -22,7 +22,7 @@ struct Bin {
 const MAX_BINS: usize = 512;
 /// A value is set apart from the rest by at least this share of the range.
 const PADDING_GAP: f64 = 0.08;
-/// What remains without the padding must fill at least this many bins: two labels are not a padding and a volume.
+/// The values without the padding must fill at least this many bins: two labels are not a padding and a volume.
 const LEAST_OCCUPIED: usize = 32;
 /// Looks at the volume at most so often.
 const MAX_PASSES: usize = 4;
@@ -85,7 +85,7 @@ impl VolumeHistogram {
         self.bins[from..to].iter().map(|b| b.count).sum()
     }
 
-    /// The middle of what a bin holds; the middle of the bin where it is empty.
+    /// The middle of the values in a bin; the middle of the bin where it is empty.
     pub(crate) fn value(&self, bin: usize) -> f64 {
         let b = self.bins[bin];
         if b.count > 0 { 0.5 * b.min + 0.5 * b.max } else { self.range.min + (bin as f64 + 0.5) * self.width }

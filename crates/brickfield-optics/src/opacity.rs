@@ -19,7 +19,7 @@ pub fn transmittance(depth: f64) -> f64 {
 
 /// Optical depth of an opacity, the inverse of [`alpha`]: -ln(1 - alpha), to rounding for alpha in [0, 1].
 ///
-/// Capped at [`OPAQUE_DEPTH`], which is what alpha = 1 gives; alpha outside [0, 1] is clamped.
+/// Capped at [`OPAQUE_DEPTH`], the depth of alpha = 1; alpha outside [0, 1] is clamped.
 #[inline]
 pub fn depth(alpha: f64) -> f64 {
     if alpha <= 0.0 {

@@ -38,7 +38,7 @@ pub enum Preset {
 }
 
 impl Preset {
-    /// All presets, those for Hounsfield units first.
+    /// All presets, presets for Hounsfield units first.
     pub const ALL: [Preset; 12] = [
         Preset::CtBone,
         Preset::CtSoftTissue,
@@ -77,7 +77,7 @@ impl Preset {
         Preset::ALL.into_iter().find(|p| p.name() == name)
     }
 
-    /// What the preset's values are.
+    /// The scale of the preset's values.
     pub const fn scale(self) -> PresetScale {
         match self {
             Preset::CtBone | Preset::CtSoftTissue | Preset::CtLung | Preset::CtSkin => PresetScale::Hounsfield,
@@ -132,7 +132,7 @@ impl Preset {
     }
 }
 
-/// What the values of a [`Preset`] are.
+/// The scale of the values of a [`Preset`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PresetScale {
     /// Hounsfield units; extinction per millimetre.
@@ -178,8 +178,8 @@ const MR_DEFAULT: [PresetKnot; 5] =
 const RAMP: [PresetKnot; 2] = [(0.05, 0.0, 0xffffff), (1.0, 20.0, 0xffffff)];
 const GRAY: [PresetKnot; 2] = [(0.05, 0.0, 0x000000), (1.0, FULL, 0xffffff)];
 
-/// Nine equidistant colours of a map, the first transparent, extinction rising with the square of the value: what is
-/// rare and high shows through what is common and low.
+/// Nine equidistant colours of a map, the first transparent, extinction rising with the square of the value: rare, high
+/// values show through common, low ones.
 const fn rising(colors: [u32; 9]) -> [PresetKnot; 9] {
     let mut points = [(0.0, 0.0, 0); 9];
     let mut i = 0;

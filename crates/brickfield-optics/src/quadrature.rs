@@ -12,7 +12,7 @@ use crate::{alpha, depth, transmittance};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum QuadratureRule {
     /// One node at the near end, alpha = min(tau h, 1): order 1, and an explicit Euler step that saturates at tau h = 1.
-    /// It is here to show what it costs.
+    /// It is here to show its error.
     LeftRiemann,
     /// One node at the near end, alpha = 1 - e^(-tau h): order 1, stable for every tau h.
     LeftExponential,
@@ -108,7 +108,7 @@ impl QuadratureRule {
 }
 
 impl RayState {
-    /// Puts a segment behind what has been seen so far.
+    /// Puts a segment behind the emission and depth so far.
     #[inline]
     pub fn push(&mut self, segment: Segment) {
         let t = transmittance(self.depth);

@@ -15,7 +15,7 @@ pub struct AdapterSummary {
     pub name: String,
     /// The driver's name and version.
     pub driver: String,
-    /// What it is.
+    /// The adapter's kind.
     pub kind: AdapterKind,
 }
 

@@ -22,7 +22,7 @@ use crate::{AdapterChoice, OpenError, adapter};
 
 /// Renders frame plans through wgpu, without a window.
 ///
-/// On the device stay: the contents of the last plan, of which the next one brings what is not there; the pipeline of each shader
+/// On the device stay: the contents of the last plan, so that the next plan brings only the chunks that differ; the pipeline of each shader
 /// variant, the picture, and buffers that grow when they must.
 pub struct WgpuBackend {
     pub(crate) device: Device,
@@ -34,7 +34,7 @@ pub struct WgpuBackend {
     outputs: Outputs,
 }
 
-/// What comes back from evaluated functions.
+/// The outputs of evaluated functions, on their way back.
 struct Outputs {
     staging: Reused,
 }
@@ -86,7 +86,7 @@ impl WgpuBackend {
         Ok(())
     }
 
-    /// Whether the device blends what a plan's polygons are drawn into.
+    /// Whether the device blends the pixel format that a plan's polygons are drawn into.
     fn check_blending(&self, plan: &FramePlan) -> Result<(), RenderError> {
         let blends_floats = plan.proxy().is_some_and(|proxy| proxy.target() == Target::Float32);
         if blends_floats && !self.device.has(Features::FLOAT32_BLENDABLE) {

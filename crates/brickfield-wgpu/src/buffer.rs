@@ -69,7 +69,7 @@ impl Reused {
         Ok(n_bytes)
     }
 
-    /// Makes room for `n_bytes` behind what is there; a buffer that must grow gets a quarter more than it had.
+    /// Makes room for `n_bytes` in all, and keeps the bytes that are there; a buffer that must grow gets a quarter more than it had.
     fn make_room(&mut self, device: &Device, n_bytes: u64) -> Result<(), RenderError> {
         let Some(old) = self.buffer.take_if(|b| b.size() < n_bytes) else {
             return self.reserve(device, n_bytes).map(drop);

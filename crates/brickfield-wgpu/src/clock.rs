@@ -41,7 +41,7 @@ impl Clock {
         device.checked("making a clock", N_BYTES, clock).ok()
     }
 
-    /// What a pass writes when it begins and ends.
+    /// The timestamps that a compute pass writes when it begins and ends.
     pub(crate) fn writes(&self) -> wgpu::ComputePassTimestampWrites<'_> {
         wgpu::ComputePassTimestampWrites {
             query_set: &self.queries,
@@ -50,7 +50,7 @@ impl Clock {
         }
     }
 
-    /// What a pass that draws writes when it begins and ends.
+    /// The timestamps that a render pass writes when it begins and ends.
     pub(crate) fn draw_writes(&self) -> wgpu::RenderPassTimestampWrites<'_> {
         wgpu::RenderPassTimestampWrites {
             query_set: &self.queries,

@@ -12,13 +12,13 @@ use crate::OpenError;
 /// 8: it is assumed everywhere.
 pub(crate) const SUB_TEXEL_BITS: u32 = 8;
 
-/// What is used where an adapter has it.
+/// The optional features that are used where an adapter has them.
 const WANTED: Features = Features::TIMESTAMP_QUERY
     .union(Features::FLOAT32_FILTERABLE)
     .union(Features::FLOAT32_BLENDABLE)
     .union(Features::TEXTURE_FORMAT_16BIT_NORM);
 
-/// A device, its queue, and what went wrong on it.
+/// A device, its queue, and its faults.
 pub(crate) struct Device {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
@@ -26,7 +26,7 @@ pub(crate) struct Device {
     faults: Arc<Faults>,
 }
 
-/// What was reported outside of any call.
+/// The faults that were reported outside of any call.
 #[derive(Default)]
 struct Faults {
     lost: AtomicBool,
@@ -57,7 +57,7 @@ impl Device {
         Ok(Device { device, queue, description, faults })
     }
 
-    /// Runs `call`, which makes `what` of `n_bytes`, and returns what the device has against it.
+    /// Runs `call`, which makes `what` of `n_bytes`, and returns the device's error, if it reports one.
     pub(crate) fn checked<T>(
         &self,
         what: &'static str,

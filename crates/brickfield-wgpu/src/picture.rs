@@ -8,7 +8,7 @@ use wgpu::BufferUsages;
 use crate::buffer::Reused;
 use crate::device::Device;
 
-/// What a picture is made by.
+/// The two ways of making a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Maker {
     /// A shader that stores its pixels.
@@ -99,7 +99,7 @@ impl Picture {
     }
 }
 
-/// What a picture comes back through.
+/// The buffer through which a picture comes back.
 pub(crate) fn staging() -> Reused {
     Reused::new("reading the picture back", BufferUsages::MAP_READ.union(BufferUsages::COPY_DST))
 }

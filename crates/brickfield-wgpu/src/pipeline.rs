@@ -17,7 +17,7 @@ pub(crate) struct Pipeline {
     pub(crate) workgroup_size: [u32; 3],
 }
 
-/// What a variant is run as.
+/// The kind of pipeline that runs a variant.
 pub(crate) enum Program {
     Compute(wgpu::ComputePipeline),
     Polygons(wgpu::RenderPipeline),

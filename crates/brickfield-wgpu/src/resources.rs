@@ -1,4 +1,4 @@
-//! What stays on the device: the contents that plans bring, by name, and the picture.
+//! The resources that stay on the device: the contents of plans, by name, and the picture.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use crate::picture::{Maker, Picture};
 use crate::pipeline::Pipeline;
 use crate::texture::Texture;
 
-/// What shaders read and write.
+/// The buffers, textures and sampler that shaders read, and the picture that they write.
 pub(crate) struct Resources {
     buffers: BTreeMap<Resource, Reused>,
     textures: BTreeMap<Resource, Texture>,
@@ -22,7 +22,7 @@ pub(crate) struct Resources {
     pub(crate) picture: Option<Picture>,
 }
 
-/// What a plan has brought.
+/// The numbers of a plan, and the bytes that were brought to the device for it.
 pub(crate) struct Brought {
     /// The frame's numbers, as for a single pass.
     pub(crate) uniforms: FrameUniforms,
@@ -56,7 +56,7 @@ impl Resources {
         self.buffers.entry(resource).or_insert_with(|| Reused::new(resource.name(), usage))
     }
 
-    /// Brings to the device what `pipeline` reads of `plan`, as far as it is not there.
+    /// Brings to the device the contents of `plan` that `pipeline` reads and the device lacks.
     pub(crate) fn bring(
         &mut self,
         device: &Device,

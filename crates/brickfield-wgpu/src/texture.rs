@@ -24,7 +24,7 @@ pub(crate) struct Texture {
 const BYTES_AT_ONCE: usize = 64 << 20;
 
 impl Texture {
-    /// Brings slots to the device, as far as they are not there; the bytes that were brought.
+    /// Brings the slots that the device lacks; returns the bytes that were brought.
     pub(crate) fn bring(
         device: &Device,
         slots: &Slots,
@@ -175,7 +175,7 @@ fn extent(size: UVec3) -> wgpu::Extent3d {
     wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: size.z }
 }
 
-/// The slots of a layer of an atlas, as far as there are any.
+/// The slots of a layer of an atlas; fewer in the last layer, or none.
 fn slots_of_layer(slots: &Slots, shape: AtlasShape, layer: u32) -> Range<u32> {
     let per_layer = shape.bricks.x * shape.bricks.y;
     layer * per_layer..slots.n_slots().min((layer + 1) * per_layer)

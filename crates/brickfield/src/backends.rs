@@ -31,7 +31,7 @@ pub struct AdapterInfo {
     pub is_software: bool,
 }
 
-/// What there is of a backend: its adapters, or why there are none.
+/// The adapters of a backend, or the reason for having none.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BackendStatus {
     /// Which backend.
@@ -63,7 +63,7 @@ pub enum BackendError {
 }
 
 impl BackendKind {
-    /// All backends; those that need no driver first.
+    /// All backends; backends that need no driver first.
     pub const ALL: [BackendKind; 3] = [BackendKind::Cpu, BackendKind::Wgpu, BackendKind::Ash];
 
     /// The name in reports and on the command line.
@@ -180,7 +180,7 @@ fn open_ash(adapter: Option<&str>, validation: Validation) -> Result<Box<dyn Bac
     Ok(Box::new(backend))
 }
 
-/// What `--adapter` means to a backend: nothing, a number, or a part of a name.
+/// The meaning of `--adapter` for a backend: none, a number, or a part of a name.
 #[cfg(any(feature = "wgpu", feature = "ash"))]
 fn choose<C>(adapter: Option<&str>, default: C, index: fn(usize) -> C, name: fn(String) -> C) -> C {
     match adapter {

@@ -73,7 +73,7 @@ fn folder_of(path: &Path) -> &Path {
 /// Writes a picture in the format of the path's extension; EXR files carry `attributes`, PNG shows `background` behind.
 ///
 /// # Errors
-/// An unknown extension, or what the file system or the encoder says.
+/// An unknown extension, or an error of the file system or the encoder.
 pub fn write_picture(
     path: &Path,
     image: &Image,

@@ -63,7 +63,7 @@ pub const MAX_FACETS: u32 = 1 << 22;
 /// Most segments on a ray: an f32 counts them exactly.
 pub const MAX_SEGMENTS: u32 = 1 << 24;
 
-/// The plan of a frame: selects the cut that the scene's criteria ask for, drops what the transfer function and the view make
+/// The plan of a frame: selects the cut that the scene's criteria ask for, drops the bricks that the transfer function and the view make
 /// invisible, gathers the rest.
 ///
 /// `residency` carries the bricks from frame to frame. A scene that is drawn again has its plan at once: nothing is selected,
@@ -86,7 +86,7 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
 /// The plan of a frame of bricks that were selected before, by filters of one's own for example
 /// ([`select_by`](brickfield_lod::select_by)); the scene's criteria are not asked.
 ///
-/// Bricks that the selection ignores are not there, whatever the scene's [`Skipping`]: their blocks are empty, and so are
+/// Bricks that the selection ignores are left out, with or without [`Skipping`]: their blocks are empty, and so are
 /// the segments of [`QuadratureRule::PreIntegrated`] that end in them.
 ///
 /// # Errors

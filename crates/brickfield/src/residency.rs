@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::Scene;
 
-/// The bricks of the last frame, in their slots, and all that was found out about them.
+/// The bricks of the last frame, in their slots, and the ranges and distances of their macrocells.
 ///
 /// A frame that needs a brick more copies one brick; a scene that is drawn again costs nothing. One residency serves one tree at a
 /// time: handed another, it begins anew.
@@ -29,7 +29,7 @@ pub struct Residency {
     copied: Copied,
 }
 
-/// What a frame copied from the tree.
+/// The bricks that a frame copied from the tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub struct Copied {
@@ -46,12 +46,12 @@ struct SlotTable {
     /// Slot by slot; none of them in a free one.
     samples: Vec<Option<Arc<Chunk>>>,
     ranges: Vec<Option<Arc<MacrocellRanges>>>,
-    /// For the transfer function that they were made for.
+    /// Under the transfer function `of`.
     distances: Vec<Option<Arc<Chunk>>>,
     of: Option<TransferFunction>,
 }
 
-/// Which bricks of a tree a transfer function makes transparent: level by level, as far as anybody asked.
+/// Which bricks of a tree a transfer function makes transparent: the levels that were asked for.
 #[derive(Debug, Default)]
 struct Transparent {
     of: Option<TransferFunction>,
@@ -64,7 +64,7 @@ impl Residency {
         &self.table.bricks
     }
 
-    /// What the last frame copied.
+    /// The bricks that the last frame copied.
     pub fn copied(&self) -> Copied {
         self.copied
     }
@@ -171,7 +171,7 @@ impl SlotTable {
         Copied { n_bricks: new.len(), n_bytes }
     }
 
-    /// Moves those of `bricks` that are there to the first slots, in their order.
+    /// Moves the bricks of `bricks` that have slots to the first slots, in their order.
     fn pack(&mut self, bricks: &[BrickId]) {
         let there: Vec<(BrickId, usize)> =
             bricks.iter().filter_map(|id| Some((*id, *self.slot_of.get(id)? as usize))).collect();
@@ -194,7 +194,7 @@ impl SlotTable {
         IndexGrid::new(layout.n_bricks(Level(0)), lattice, self.bricks.iter().map(entry))
     }
 
-    /// What a transfer function shows of the macrocells; `None` if it shows something of all, or if they are too many for a map.
+    /// The dark macrocells under a transfer function; `None` if there are none, or too many macrocells for a map.
     fn occupancy(&mut self, slots: &Slots, transfer: &TransferFunction) -> Option<Arc<Occupancy>> {
         let side = slots.brick_side().filter(|side| Occupancy::fits(*side, slots.n_slots()))?;
         if self.of.as_ref() != Some(transfer) {

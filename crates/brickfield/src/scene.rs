@@ -1,4 +1,4 @@
-//! What to render, as plain data.
+//! A scene to render, as plain data.
 
 use brickfield_core::glam::UVec2;
 use brickfield_core::{Aabb, Camera, TransferFunction};
@@ -6,7 +6,7 @@ use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
 use brickfield_lod::{Criterion, Culling, View};
 use brickfield_optics::QuadratureRule;
 
-/// What to render: everything but the volume.
+/// A scene to render: everything but the volume.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// Where the picture is taken from.
@@ -23,7 +23,7 @@ pub struct Scene {
     pub mode: Mode,
     /// Between which surfaces segments lie.
     pub placement: Placement,
-    /// What is divided into segments: rays, or their way through each brick by its level's steps.
+    /// The span that is divided into segments: a ray's way through the domain, or through each brick by its level's steps.
     pub division: Division,
     /// For which length the light through a sample is computed.
     pub lengths: Lengths,
@@ -55,7 +55,7 @@ pub enum Skipping {
     /// They are neither uploaded nor sampled.
     #[default]
     On,
-    /// Every brick of the cut is uploaded and sampled: to measure what skipping saves.
+    /// Every brick of the cut is uploaded and sampled: to measure the gain of skipping.
     Off,
 }
 
@@ -78,7 +78,7 @@ impl Scene {
             technique: Technique::RayCasting,
         }
     }
-    /// For whom bricks are selected. Without skipping, those outside the view are kept, too.
+    /// The view for which bricks are selected. Without skipping, bricks outside the view are kept, too.
     pub fn view(&self) -> View {
         let culling = match self.skipping {
             Skipping::On => Culling::Frustum,

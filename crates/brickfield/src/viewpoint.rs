@@ -93,11 +93,11 @@ impl FromStr for Viewpoint {
 }
 
 impl Viewpoint {
-    /// The camera for a volume on `grid`, for a picture of `size`. What is not stated is chosen so that the volume fills
+    /// The camera for a volume on `grid`, for a picture of `size`. Numbers that are not stated are chosen so that the volume fills
     /// the picture, upright by `frame`.
     ///
     /// # Errors
-    /// What [`Camera::look_at`] refuses.
+    /// The errors of [`Camera::look_at`].
     pub fn camera(&self, grid: &Grid, frame: WorldFrame, size: UVec2) -> Result<Camera, CameraError> {
         let center = self.target.unwrap_or_else(|| grid.world_box().center());
         let (side_from, side_up) = side_directions(self.side.unwrap_or_default(), frame);
@@ -128,7 +128,7 @@ impl Viewpoint {
     }
 }
 
-/// What it takes to see a whole volume.
+/// The measures of a volume from which the distance follows at which a camera sees all of it.
 struct Fit {
     /// Corners relative to the centre: right (scaled to the height's share), up, towards the view.
     corners: [DVec3; 8],

@@ -10,7 +10,7 @@ pub(crate) struct Visibility {
 }
 
 impl Visibility {
-    /// Those bricks of a cut, all others being transparent, and their neighbours within `reach` level-0 bricks (rules whose
+    /// The visible bricks of a cut (all others are transparent), and their neighbours within `reach` bricks of level 0 (rules whose
     /// segments span two nodes need the data at both).
     pub(crate) fn around(layout: BrickLayout, visible: impl Iterator<Item = BrickId>, reach: u32) -> Visibility {
         let mut visibility = Visibility { layout, cells: vec![false; layout.n_bricks_total(Level(0))] };

@@ -56,7 +56,7 @@ impl Contest<'_> {
 
     fn first_round(&mut self, bar: &ProgressBar) -> Result<(Vec<BackendAtPoint>, Vec<LeftOut>), CompareError> {
         let (mut entries, mut left_out): (Vec<BackendAtPoint>, Vec<LeftOut>) = (Vec::new(), Vec::new());
-        // Half the time is for first frames, so that the other half is for timed ones; what leads may take more.
+        // Half the time is for first frames, so that the other half is for timed ones; the leading points may take more.
         let begin = Instant::now();
         let half = begin + self.limits.end.saturating_duration_since(begin) / 2;
         for point in 0..self.points.len() {

@@ -104,7 +104,7 @@ struct CompareResult {
     seconds: f64,
 }
 
-/// The continuous answer, and what the report says of it.
+/// The continuous answer, and its lines in the report.
 fn answer(
     args: &CompareArgs,
     exhibit: &Exhibit,

@@ -82,7 +82,7 @@ pub struct CompareArgs {
 /// The options of a command line; the first argument is the command's name.
 ///
 /// # Errors
-/// What clap says, to be printed by its `exit`.
+/// clap's message, to be printed by its `exit`.
 pub fn parse(arguments: Vec<OsString>) -> Result<CompareArgs, clap::Error> {
     let words = arguments.iter().skip(1).map(|a| quoted(&a.to_string_lossy()));
     let command = std::iter::once("cargo xtask compare".to_owned()).chain(words).collect::<Vec<_>>().join(" ");

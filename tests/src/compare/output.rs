@@ -1,4 +1,4 @@
-//! What a comparison writes: pictures as they come, report and page at the end, all at once visible.
+//! The files of a comparison: pictures as they come, report and page at the end, all at once visible.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -153,7 +153,7 @@ impl Pictures<'_> {
 /// Prints text; a reader that has gone away is no error.
 ///
 /// # Errors
-/// What else the system says.
+/// Any other error of the system.
 pub fn say(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {

@@ -1,4 +1,4 @@
-//! The backends that are compared, and those that are absent.
+//! The backends that are compared, and the backends that are absent.
 
 use brickfield::frame::{Backend, Description};
 use brickfield::{BackendError, BackendKind, Validation, open_backend};
@@ -6,7 +6,7 @@ use brickfield::{BackendError, BackendKind, Validation, open_backend};
 use super::CompareError;
 use crate::report::BackendInfo;
 
-/// The backends that could be opened, and what is to be said of all that were asked for.
+/// The backends that could be opened, and a line for each that was asked for.
 pub(crate) struct Rivals {
     pub(crate) present: Vec<Box<dyn Backend>>,
     pub(crate) infos: Vec<BackendInfo>,

@@ -1,4 +1,4 @@
-//! What is rendered: a file's volume or the phantom, with its scene.
+//! The volume that is rendered, a file's or the phantom, with its scene.
 
 use brickfield::Scene;
 use brickfield::core::glam::DVec3;

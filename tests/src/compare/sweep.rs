@@ -11,7 +11,7 @@ use brickfield::{Residency, Scene, prepare};
 use super::subject::Exhibit;
 use super::{CompareArgs, CompareError};
 
-/// Steps of the fast mode, whose filter and early ends hide what smaller ones gain.
+/// Steps of the fast mode, whose filter and early ends hide the gain of smaller ones.
 const FAST: &[f64] = &[2.0, 1.0, 0.5, 0.25];
 /// Steps of the exact mode, rules of order 1.
 const FIRST_ORDER: &[f64] = &[2.0, 1.0, 0.5, 0.25, 0.125];
@@ -32,7 +32,7 @@ pub(super) struct SweepPoint {
     pub(super) n_samples: u64,
 }
 
-/// What comes first, and what may be left out.
+/// When a point is measured, and whether it may be left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Priority {
     /// The curve that shows how far the error falls: measured whatever it costs, within the time.
@@ -57,7 +57,7 @@ pub(super) fn sweep_points(args: &CompareArgs, exhibit: &Exhibit) -> Result<Vec<
     Ok(all)
 }
 
-/// The points of the sweep: those that are asked for, or those that are worth it.
+/// The points of the sweep: the points that are asked for, or else the points that are worth their time.
 fn points(args: &CompareArgs) -> Vec<(Mode, QuadratureRule, f64, Priority)> {
     let best = args.rules.iter().copied().max_by_key(|r| r.order());
     let mut points = Vec::new();
@@ -86,7 +86,7 @@ fn steps(args: &CompareArgs, rule: QuadratureRule, mode: Mode) -> Vec<f64> {
     steps
 }
 
-/// Nodes of all segments in the domain, over all rays: what is evaluated without skipping.
+/// Nodes of all segments in the domain, over all rays: the number of evaluations without skipping.
 fn count_samples(plan: &FramePlan) -> u64 {
     let (size, h) = (plan.size(), plan.sampling().step_world());
     let n_segments = |x: u32, y: u32| {

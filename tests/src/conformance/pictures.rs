@@ -1,4 +1,4 @@
-//! expected | actual | difference, side by side, for those who have to find out.
+//! expected | actual | difference, side by side, to find the cause of a failure.
 
 use std::io;
 use std::path::Path;

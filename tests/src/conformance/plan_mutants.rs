@@ -65,7 +65,7 @@ pub enum PlanMutant {
     RedBlueSwapped,
     /// Rays end at a transmittance of 1/4.
     EndsEarly,
-    /// What lies behind the eye is seen.
+    /// The volume behind the eye is seen.
     BehindTheEye,
     /// The clip box is ignored.
     ClipIgnored,
@@ -77,9 +77,9 @@ pub enum PlanMutant {
     PolygonsMissing,
     /// The faces through which rays leave bricks are not drawn.
     ExitsMissing,
-    /// Of three stacks of planes, those across z are missing.
+    /// Of three stacks of planes, the stack across z is missing.
     StackMissing,
-    /// What was drawn is forgotten when the last batch begins.
+    /// The picture of all earlier batches is forgotten when the last batch begins.
     BatchesForgotten,
 }
 

@@ -2,10 +2,10 @@
 //!
 //! **Exact mode**, against the discrete f64 answer, all four channels: |difference| <= 1e-4 up to 2,048 samples a ray and
 //! 2.5e-4 above, for no sum is longer than 8,192 segments and the sums of passes are few; 99.9 % of the pixels within 1e-5.
-//! Both are wider by the reference's `ambiguity` of the pixel; the narrow one also by what one rounding of each term of a
+//! Both are wider by the reference's `ambiguity` of the pixel; the narrow one also by the effect of one rounding of each term of a
 //! position may change (`position_rounding`), which is more than 1e-5 where the transfer function is steep and opaque.
 //!
-//! **Fast mode** adds, per pixel, what hardware filtering may do (`filter_rounding`) and, where a ray may end early, the
+//! **Fast mode** adds, per pixel, the effect of hardware filtering (`filter_rounding`) and, where a ray may end early, the
 //! transmittance floor: that is the most that any channel can lose behind the point where it ends.
 //! **Polygons** are blended: of each segment that a ray sees, three roundings remain, of 1 - alpha, of its product with what lies
 //! behind and of the sum, each of at most the target's unit roundoff: 2^-24, or 2^-11 for 16-bit floats, in which a device may blend.

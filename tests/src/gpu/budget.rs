@@ -1,10 +1,10 @@
-//! The time that is allowed, shared out among the parts, and what found no time or memory.
+//! The time that is allowed, shared out among the parts, and the measurements that found no time or memory.
 
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
-/// What was asked for and not measured.
+/// A measurement that was asked for and not made.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct Unmeasured {
@@ -35,7 +35,7 @@ impl Budget {
         Budget { begin: Instant::now(), seconds: seconds.clamp(0.0, 1e6) }
     }
 
-    /// When `share` of the time is over: a part gets besides what earlier parts left.
+    /// When `share` of the time is over: a part also gets the time that earlier parts left.
     pub(super) fn until(&self, share: f64) -> Deadline {
         Deadline(self.begin + Duration::from_secs_f64(self.seconds * share))
     }

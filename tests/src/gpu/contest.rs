@@ -1,4 +1,4 @@
-//! Frames by turns: what skipping saves, brick sides, backends, an empty frame, and the octree's build.
+//! Frames by turns: with and without skipping, brick sides, backends, an empty frame, and the octree's build.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -21,7 +21,7 @@ pub struct DeviceInfo {
 /// The GPU backends that are there.
 pub(super) type Devices = Vec<(BackendKind, Box<dyn Probe>)>;
 
-/// Those that are measured on a GPU.
+/// The backends that are measured on a GPU.
 pub(super) const KINDS: [BackendKind; 2] = [BackendKind::Wgpu, BackendKind::Ash];
 
 /// Opens both GPU backends on the adapter that `adapter` names, or on their default.

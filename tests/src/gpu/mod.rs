@@ -1,6 +1,6 @@
-//! One measurement of a GPU: is it right, how far off is fast mode, how fast is it, and how near to what its texture units do.
+//! One measurement of a GPU: conformance, the error of fast mode, its speed, and that speed against the rate of its texture units.
 //!
-//! For a machine with a card and without a toolchain: the program `gpu` needs no file beside it. What finds no time or no
+//! For a machine with a card and without a toolchain: the program `gpu` needs no file beside it. A measurement that finds no time or no
 //! memory is left out and listed; nothing else is.
 //!
 //! - [`measure`]: all parts, one after the other, into a [`GpuReport`].
@@ -35,7 +35,7 @@ pub use table::table;
 
 use crate::report::Machine;
 
-/// What is asked for.
+/// The measurement that is asked for.
 #[derive(Clone, Debug)]
 pub struct GpuArgs {
     /// How much.
@@ -110,14 +110,14 @@ impl Form {
     }
 }
 
-/// What a part found, what it left out, and a line that says so.
+/// The results of a part, the measurements that it left out, and a line for each of these.
 struct PartResult<T> {
     found: T,
     left_out: Vec<Unmeasured>,
     line: String,
 }
 
-/// Shares of the time at which parts must end: what a part leaves is the next ones'.
+/// Shares of the time at which parts must end: the time that a part leaves goes to the next ones.
 const CONFORMANCE: f64 = 0.3;
 const ERRORS: f64 = 0.4;
 const CONTEST: f64 = 0.55;

@@ -1,4 +1,4 @@
-//! What was measured, as data: `gpu.json`.
+//! The results of a measurement, as data: `gpu.json`.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,9 +19,9 @@ pub struct GpuReport {
     pub date: String,
     /// `short` or `long`.
     pub form: String,
-    /// What was allowed.
+    /// The seconds that were allowed.
     pub seconds_allowed: f64,
-    /// What it took.
+    /// The seconds that it took.
     pub seconds: f64,
     /// Of what.
     pub versions: Versions,
@@ -31,9 +31,9 @@ pub struct GpuReport {
     pub memory_bytes: Option<u64>,
     /// On which device, by each GPU backend.
     pub devices: Vec<DeviceInfo>,
-    /// How long each part took, and what it left out.
+    /// How long each part took, and the measurements that it left out.
     pub parts: Vec<Part>,
-    /// What is wrong; empty if all is well.
+    /// The failures; empty if all is well.
     pub failures: Vec<String>,
     /// Both backends against the f64 answer, and against each other.
     pub conformance: Conformance,
@@ -53,7 +53,7 @@ pub struct GpuReport {
     pub textures: Vec<TextureRate>,
 }
 
-/// Versions of what is measured.
+/// Versions of the measured program and libraries.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct Versions {
@@ -74,7 +74,7 @@ pub struct Part {
     pub left_out: Vec<Unmeasured>,
 }
 
-/// What conformance found.
+/// The outcome of conformance.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct Conformance {
@@ -107,7 +107,7 @@ pub struct ModeError {
     pub rmse: f64,
     pub max: f64,
     pub p999: f64,
-    /// The greatest error in units of what the rule allows in its pixel.
+    /// The greatest error in units of the rule's bound in its pixel.
     pub of_bound: f64,
     /// Why the rule is broken, if it is.
     pub complaint: Option<String>,
@@ -120,7 +120,7 @@ pub struct FilterBits {
     pub backend: String,
     /// Type of the voxels.
     pub scalar: String,
-    /// What the backend states (`subTexelPrecisionBits`, or what is assumed).
+    /// The bits that the backend states (`subTexelPrecisionBits`), or assumes.
     pub stated: u32,
     /// The binary logarithm of the steps between two samples; no more than the positions that were looked at tell apart.
     pub measured: f64,
@@ -183,7 +183,7 @@ pub struct Steady {
     pub whole_ms: Spread,
     /// Values that a frame samples: known without skipping.
     pub n_samples: Option<u64>,
-    /// Those, by the device's time.
+    /// The same, by the device's time.
     pub msamples_per_s: Option<f64>,
     /// That over the rate at which the device reads textures of this size ([`TextureRate`]): eight loads for exact mode, the
     /// filter for fast mode.
@@ -227,7 +227,7 @@ impl GpuReport {
 }
 
 impl Versions {
-    /// Those of this build; `commit` is what the caller states.
+    /// The versions of this build; `commit` is the one that the caller states.
     pub(super) fn here(commit: Option<&str>) -> Versions {
         let of = |name: &str| locked(include_str!("../../../Cargo.lock"), name).unwrap_or_else(|| "unknown".to_owned());
         Versions {

@@ -22,7 +22,7 @@ use crate::volumes::{phantom_camera, phantom_transfer};
 /// Least and most timed frames.
 const FRAMES: [u32; 2] = [1, 60];
 
-/// What steady frames found.
+/// The results of steady frames.
 #[derive(Default)]
 pub(super) struct SteadyFrames {
     pub(super) volumes: Vec<VolumeInfo>,
@@ -116,7 +116,7 @@ fn volume(voxels: u32, phantoms: &mut Phantoms) -> Result<Made, String> {
     Ok(Made { tree, camera, info })
 }
 
-/// Where what is measured goes.
+/// The lists that measurements are added to.
 struct Measured<'a> {
     form: Form,
     /// Until then first frames and texture reads may begin.
@@ -196,7 +196,7 @@ impl Measured<'_> {
         all
     }
 
-    /// The texture rates of this size; those of other formats at the smallest.
+    /// The texture rates of this size; rates of other formats only at the smallest.
     fn textures(&mut self, voxels: u32, devices: &mut Devices) {
         let sizes = self.form.sizes();
         let formats: &[SampleFormat] = match voxels == sizes.steady[0] {

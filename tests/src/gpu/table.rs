@@ -95,7 +95,7 @@ mod tests {
 
     use super::*;
 
-    /// What README.md shows is what the saved reports say.
+    /// The table in README.md is the table of the saved reports.
     #[test]
     fn the_readme_shows_the_saved_reports() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

@@ -1,4 +1,4 @@
-//! How fast a device reads trilinear values: what the march is compared with.
+//! How fast a device reads trilinear values, to compare the march with.
 
 use brickfield::frame::{Fetch, Probe, SampleFormat, TextureWork};
 use brickfield_core::glam::{UVec2, UVec3};
@@ -93,7 +93,7 @@ fn rays_for(seconds_few: f64, few: u32, most: u32) -> u32 {
     halved.take_while(|rays| *rays > few).find(|rays| seconds(*rays) <= MOST_SECONDS).unwrap_or(few)
 }
 
-/// What is wrong with the means of some rays, if anything is: a rate of reads that were not made is none.
+/// The fault of the means of some rays, if there is one: reads that were not made have no rate.
 fn wrong(work: &TextureWork, means: &[f32], sub_texel_bits: u32) -> Option<String> {
     let bound = match work.fetch {
         Fetch::Loaded => 1e-4,

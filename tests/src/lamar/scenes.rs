@@ -1,4 +1,4 @@
-//! What is looked at, from where, by which geometry.
+//! The volumes that are rendered, from where, by which geometry.
 
 use std::path::{Path, PathBuf};
 
@@ -32,7 +32,7 @@ pub(super) struct Geometry {
     pub(super) technique: Technique,
 }
 
-/// Whether the data that the parts need are there, and what `--only` says is one of them.
+/// Whether the data that the parts need are there, and the text of `--only` is in one of their paths.
 pub(super) fn check_data(args: &LamarArgs) -> Result<(), LamarError> {
     let are_named = args.only.is_some() || !args.files.is_empty();
     if !are_named && !args.parts().into_iter().any(Part::needs_data) {
@@ -49,7 +49,7 @@ pub(super) fn data_sets(args: &LamarArgs) -> Result<impl Iterator<Item = Result<
     Ok(named(args)?.into_iter().map(|(name, path)| data_set(name, &path)))
 }
 
-/// The volumes that are asked for: what the tables call them, and where they are.
+/// The volumes that are asked for: their names in the tables, and their paths.
 fn named(args: &LamarArgs) -> Result<Vec<(String, PathBuf)>, LamarError> {
     if !args.files.is_empty() {
         let name = |path: &PathBuf| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
@@ -118,7 +118,7 @@ pub(super) fn rasterises(backend: &dyn Backend) -> bool {
     backend.describe().backend != "cpu"
 }
 
-/// Those that a backend draws: without a rasteriser, only rays.
+/// The geometries that a backend draws: without a rasteriser, only rays.
 pub(super) fn geometries_of(args: &LamarArgs, backend: &dyn Backend) -> impl Iterator<Item = Geometry> + use<> {
     let rasterises = rasterises(backend);
     geometries(args).into_iter().filter(move |g| rasterises || g.technique == Technique::RayCasting)

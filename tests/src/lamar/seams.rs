@@ -20,7 +20,7 @@ const SIDE: u32 = 96;
 const EXTINCTION: f64 = 0.012;
 /// Random cuts.
 const N_CUTS: u32 = 12;
-/// What rounding may leave of a constant field: 200 segments of three roundings each (see the rules of conformance).
+/// The effect of rounding on a constant field: 200 segments of three roundings each (see the rules of conformance).
 const ROUNDING: f64 = 200.0 * 3.0 * 6e-8;
 
 /// The cube of figure 8.
@@ -74,7 +74,7 @@ fn seams(
         let scene = scene(args, fog, camera()?, geometry, &[Criterion::FullResolution]);
         let exact = closed_form(&scene, tree.grid());
         let single = render(tree, &scene, None, backend)?;
-        // Of what is not a number there is no greatest: that is an error.
+        // Without a number there is no greatest one: that is an error.
         let greatest_difference = |a: &Image<f32>, b: &Image<f64>| errors(a, b).map(|e| e.worst.difference);
         let (mut seam, mut off) = (0.0f64, greatest_difference(&single, &exact)?);
         for cut in &cuts {
@@ -240,7 +240,7 @@ struct DepthRatios {
 }
 
 impl DepthRatios {
-    /// Whether they are what figure 8 shows of a geometry.
+    /// Whether the seams are the seams of figure 8 for a geometry.
     fn are_of(&self, placement: Placement) -> bool {
         match placement {
             // The cosine of a ray to its planes is no less than 1 / sqrt 3.

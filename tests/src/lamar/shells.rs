@@ -16,7 +16,7 @@ use crate::volumes::phantom;
 
 /// Facets' sides, in pixels: the coarsest are a sixth of the picture.
 const FACETS: [u32; 6] = [64, 32, 16, 8, 4, 2];
-/// Errors below this are what rounding of blending leaves.
+/// Errors below this are the rounding of blending.
 const FLOOR: f64 = 1e-6;
 /// Pictures of this side.
 const SIZE: u32 = 384;

@@ -1,9 +1,9 @@
 //! A slope through errors.
 
-/// One row of the table: a claim, and what was observed.
+/// One row of the table: a claim, and the observation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrderRow {
-    /// What is refined, for what.
+    /// The refined quantity, and the rule or renderer.
     pub what: String,
     /// The claimed order.
     pub order: f64,
@@ -16,7 +16,7 @@ pub struct OrderRow {
     pub n_halvings: usize,
 }
 
-/// What was observed.
+/// The observed order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observed {
     /// The least-squares slope of log error over log parameter.

@@ -1,7 +1,7 @@
 //! Observed orders of accuracy, and closed forms met to rounding.
 //!
 //! Order is tested, not asserted: a rule that claims order p is run with its step halved, and the slope of its error over
-//! the step is fitted. What is wrong by one node, one segment or half a voxel loses its order long before it is seen.
+//! the step is fitted. A renderer that is wrong by one node, one segment or half a voxel loses its order long before the error is seen.
 
 mod closed_forms;
 mod fit;

@@ -2,7 +2,7 @@
 
 use super::Row;
 
-/// What a measurement costs: time and error.
+/// The cost of a measurement: time and error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Cost {

@@ -1,4 +1,4 @@
-//! What a comparison found, as data (`report.json`), as a table for the terminal and as one self-contained page.
+//! The results of a comparison, as data (`report.json`), as a table for the terminal and as one self-contained page.
 
 mod front;
 mod heat;
@@ -39,11 +39,11 @@ pub struct Report {
     pub driver: String,
     /// Every backend, present or absent.
     pub backends: Vec<BackendInfo>,
-    /// What the errors are taken against.
+    /// The reference that the errors are taken against.
     pub reference: ReferenceInfo,
     /// One row for each backend, mode, rule and step.
     pub rows: Vec<Row>,
-    /// What was asked for and not measured, and why.
+    /// The points that were asked for and not measured, and why.
     pub left_out: Vec<LeftOut>,
     /// How long the whole comparison took.
     pub total_seconds: f64,
@@ -119,7 +119,7 @@ pub struct Row {
     pub rule: String,
     /// Length of a segment, in units of the least voxel spacing.
     pub step_voxels: f64,
-    /// Nodes of all segments in the domain, over all rays: what would be evaluated without skipping.
+    /// Nodes of all segments in the domain, over all rays: the number of evaluations without skipping.
     pub samples: u64,
     /// Median wall time of rendering, without upload and read-back.
     pub median_ms: f64,
@@ -168,7 +168,7 @@ pub struct LeftOut {
     pub reason: String,
 }
 
-/// What the points of one curve share.
+/// The settings that the points of one curve share.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub struct CurveKey {

@@ -8,7 +8,7 @@ use plotters::prelude::*;
 
 use super::{CurveKey, Report, Row, observed_order, step_label};
 
-/// What a plot shows error against.
+/// The quantity that a plot shows error against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Against {
     /// Median time.
@@ -178,7 +178,7 @@ fn curve(key: &CurveKey, rows: &[&Row], place: &dyn Fn(&Row) -> (i32, i32)) -> S
     svg
 }
 
-/// What the page filters by.
+/// The attributes that the page filters by.
 pub(super) fn attributes(key: &CurveKey) -> String {
     format!("data-backend=\"{}\" data-mode=\"{}\" data-rule=\"{}\"", key.backend, key.mode, key.rule)
 }

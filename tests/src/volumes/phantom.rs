@@ -16,7 +16,7 @@ pub const PHANTOM_DIMS: UVec3 = UVec3::new(112, 128, 120);
 /// Edge lengths of the phantom's box, in millimetres: at [`PHANTOM_DIMS`] the voxels measure 1.6 x 1.6 x 1.8 mm.
 const EXTENT_MM: DVec3 = DVec3::new(179.2, 204.8, 216.0);
 
-/// The phantom as a scene: what to look at, how, and from where.
+/// The phantom as a scene: volume, transfer function and view.
 #[derive(Clone, Debug)]
 #[allow(missing_docs)]
 pub struct Phantom {
@@ -70,7 +70,7 @@ pub fn phantom_camera(grid: &Grid) -> Result<Camera, CameraError> {
     Camera::look_at(eye, center, DVec3::Z, Projection::Perspective { fov_y: 27f64.to_radians() })
 }
 
-/// A solid that covers what comes before it in the list.
+/// A solid that covers the solids before it in the list.
 struct Solid {
     shape: Shape,
     /// Value inside, 0 to 1.

@@ -1,4 +1,4 @@
-//! Physical devices: what they are, and their limits.
+//! Physical devices: their kinds and limits.
 #![expect(unsafe_code, reason = "Vulkan's functions are foreign")]
 
 use std::borrow::Cow;

@@ -92,7 +92,7 @@ impl HostBuffer {
         &self.buffer
     }
 
-    /// Writes bytes at an offset; the device sees them in what is submitted afterwards.
+    /// Writes bytes at an offset; work that is submitted afterwards sees them.
     pub(crate) fn write(&mut self, offset: usize, bytes: &[u8]) {
         assert!(offset + bytes.len() <= self.buffer.n_bytes as usize, "a write past the end of a staging buffer");
         // SAFETY: within the mapping (asserted), which nobody else touches: `self` is borrowed, the device is idle.

@@ -1,4 +1,4 @@
-//! What polygons are drawn into: an image with a render pass and a framebuffer.
+//! The canvas that polygons are drawn into: an image with a render pass and a framebuffer.
 #![expect(unsafe_code, reason = "Vulkan's functions are foreign")]
 
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use super::image::target_format;
 use super::{Device, VulkanImage};
 use crate::error::{FailedCall, OfCall};
 
-/// A pass over one colour image that keeps what is there; its layout is that of [`Use::Canvas`](super::Use::Canvas) before and after.
+/// A render pass over one colour image that keeps the image's pixels; the image's layout is that of [`Use::Canvas`](super::Use::Canvas) before and after.
 pub(super) struct RenderPass {
     pub(super) raw: vk::RenderPass,
     device: Arc<Device>,
@@ -27,7 +27,7 @@ pub(crate) struct Canvas {
 }
 
 impl RenderPass {
-    /// The pass for a target; those of one target are compatible.
+    /// The render pass for a target; render passes of one target are compatible.
     pub(super) fn new(device: &Arc<Device>, target: Target) -> Result<RenderPass, FailedCall> {
         let layout = vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL;
         let attachments = [vk::AttachmentDescription::default()
@@ -93,7 +93,7 @@ fn check(device: &Device, target: Target) -> Result<(), RenderError> {
     }
 }
 
-/// Images may be larger than what is drawn into.
+/// Images may be larger than the part that is drawn into.
 fn check_size(limits: &vk::PhysicalDeviceLimits, size: UVec2) -> Result<(), RenderError> {
     let viewport = UVec2::from(limits.max_viewport_dimensions);
     let most = UVec2::new(limits.max_framebuffer_width, limits.max_framebuffer_height).min(viewport);

@@ -36,7 +36,7 @@ impl Device {
         &self.raw
     }
 
-    /// What the device is, and its limits.
+    /// The device's kind and limits.
     pub(crate) fn physical(&self) -> &PhysicalDevice {
         &self.physical
     }
@@ -51,7 +51,7 @@ impl Device {
         self.family.draws
     }
 
-    /// What optimally tiled images of a format can do.
+    /// The features of optimally tiled images of a format.
     pub(crate) fn format_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
         // SAFETY: the physical device is one of this instance.
         let properties =
@@ -62,7 +62,7 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        // SAFETY: whatever was made from the device holds it, so nothing is left.
+        // SAFETY: every object that was made from the device holds it, so none is left.
         unsafe { self.raw.destroy_device(None) };
     }
 }

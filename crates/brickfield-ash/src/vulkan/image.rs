@@ -151,7 +151,7 @@ pub(crate) fn vulkan_format(format: SampleFormat) -> vk::Format {
     }
 }
 
-/// The format of what polygons are blended into.
+/// The format of the image that polygons are blended into.
 pub(crate) fn target_format(target: Target) -> vk::Format {
     match target {
         Target::Float32 => vk::Format::R32G32B32A32_SFLOAT,

@@ -42,7 +42,7 @@ impl Instance {
         &self.raw
     }
 
-    /// What the validation layer said.
+    /// The messages of the validation layer.
     pub(crate) fn log(&self) -> &ValidationLog {
         &self.log
     }

@@ -15,9 +15,9 @@ use crate::error::FailedCall;
 pub(crate) enum Residence {
     /// Close to the device.
     Device,
-    /// Where the host writes what the device copies.
+    /// The host writes it, the device copies from it.
     Upload,
-    /// Where the device writes what the host reads.
+    /// The device writes it, the host reads it.
     ReadBack,
 }
 

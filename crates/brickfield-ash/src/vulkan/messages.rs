@@ -1,4 +1,4 @@
-//! What the validation layer says.
+//! The messages of the validation layer.
 #![expect(unsafe_code, reason = "Vulkan calls back through a C function")]
 
 use std::ffi::c_void;
@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ash::vk;
 
-/// What Vulkan's validation layer said; empty if all is well.
+/// The messages of Vulkan's validation layer; none if all is well.
 ///
-/// Clones share their messages, and may outlive the backend: what is said about its end is kept too.
+/// Clones share their messages, and may outlive the backend: messages about its end are kept, too.
 #[derive(Clone, Debug, Default)]
 pub struct ValidationLog(Arc<Mutex<Vec<String>>>);
 
@@ -27,7 +27,7 @@ impl ValidationLog {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// How a messenger writes to this log; what is created with it must be destroyed before the log.
+    /// How a messenger writes to this log; an object that is created with it must be destroyed before the log.
     pub(super) fn messenger(&self) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
         use vk::{DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as Type};
         vk::DebugUtilsMessengerCreateInfoEXT::default()

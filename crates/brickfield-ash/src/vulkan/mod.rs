@@ -1,10 +1,10 @@
 //! Vulkan's objects, each owned by one value, behind functions that cannot be misused from this crate.
 //!
 //! Three rules make the functions of this module safe. A value keeps its device alive (`Arc<Device>`) and destroys its
-//! object when dropped. A [`Recorder`] borrows what it records for as long as [`Queue::run`] lasts. And `run` returns only
+//! object when dropped. A [`Recorder`] borrows the objects that it records for as long as [`Queue::run`] lasts. And `run` returns only
 //! when the device has finished, so no object is destroyed, rewritten or read while the device works with it.
 //!
-//! Vulkan binds no object to a thread, so all of them are `Send`. What it asks for is that no two threads use certain objects at
+//! Vulkan binds no object to a thread, so all of them are `Send`. It demands that no two threads use certain objects at
 //! once ("externally synchronized"): the queue, the command pool and its buffer, the fence, a descriptor set and its pool. Each
 //! of these is reached only through a mutable borrow of the [`Queue`] or [`Pipeline`] that owns it, so that a backend may move
 //! between threads and is used by one at a time. Memory is mapped once, when it is made; the pointer belongs to its

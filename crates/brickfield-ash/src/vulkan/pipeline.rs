@@ -1,4 +1,4 @@
-//! Pipelines, and what is bound to them.
+//! Pipelines, and the resources that are bound to them.
 #![expect(unsafe_code, reason = "Vulkan's functions are foreign")]
 
 use std::ffi::CString;
@@ -27,7 +27,7 @@ pub(crate) struct Pipeline {
     device: Arc<Device>,
 }
 
-/// What a shader's binding is bound to; buffers from their start, with the bytes that the shader sees.
+/// The resource of a shader's binding; buffers from their start, with the bytes that the shader sees.
 #[derive(Clone, Copy)]
 pub(crate) enum Bindable<'a> {
     Buffer { buffer: &'a Buffer, n_bytes: u64 },
@@ -82,7 +82,7 @@ impl Pipeline {
         self.workgroup_size
     }
 
-    /// Binds what the shader needs; `bindable` says what a binding stands for.
+    /// Binds the resources that the shader names; `bindable` finds the resource of a binding.
     pub(crate) fn bind<'a>(
         &'a mut self,
         bindable: impl Fn(&Binding) -> Option<Bindable<'a>>,
@@ -195,7 +195,7 @@ impl Pipeline {
         Ok(made.map_err(|(_, code)| code).of("vkCreateComputePipelines")?[0])
     }
 
-    /// Triangles of [`ProxyCorner`]s, seen from both sides, blended over what is there; viewport and scissor are set when drawing.
+    /// Triangles of [`ProxyCorner`]s, seen from both sides, blended over the pixels that are there; viewport and scissor are set when drawing.
     fn compile_polygons(&self, module: vk::ShaderModule, target: Target) -> Result<vk::Pipeline, RenderError> {
         let names = names(self.entry)?;
         let stages = [
@@ -232,7 +232,7 @@ impl Pipeline {
             .dynamic_state(&dynamic)
             .layout(self.layout)
             .render_pass(pass.raw);
-        // SAFETY: all that the description names is alive; stages and layout are of one module. The pass may go: those that
+        // SAFETY: all objects of the description are alive; stages and layout are of one module. The render pass may go: the ones that
         // the pipeline is used in are compatible.
         let made = unsafe { self.device.raw().create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
         Ok(made.map_err(|(_, code)| code).of("vkCreateGraphicsPipelines")?[0])
@@ -266,7 +266,7 @@ fn corner_attributes() -> [vk::VertexInputAttributeDescription; 4] {
     })
 }
 
-/// Premultiplied colours over what is there.
+/// Premultiplied colours over the pixels that are there.
 fn over() -> vk::PipelineColorBlendAttachmentState {
     let (one, rest) = (vk::BlendFactor::ONE, vk::BlendFactor::ONE_MINUS_SRC_ALPHA);
     vk::PipelineColorBlendAttachmentState::default()

@@ -19,7 +19,7 @@ pub(crate) struct Queue {
     device: Arc<Device>,
 }
 
-/// Two timestamps, and what they mean.
+/// Two timestamps, and their unit.
 #[derive(Clone, Copy)]
 struct Timestamps {
     pool: vk::QueryPool,
@@ -47,7 +47,7 @@ impl Queue {
 
     /// Records, submits, and waits until the device has finished.
     ///
-    /// What is recorded is borrowed for `'a`, which lasts at least until the device has finished. If `record` panics nothing
+    /// Recorded objects are borrowed for `'a`, which lasts at least until the device has finished. If `record` panics nothing
     /// is submitted, and the queue can be used again.
     pub(crate) fn run<'a>(
         &mut self,
@@ -103,7 +103,7 @@ impl Queue {
     fn submit_and_wait(&mut self) -> Result<(), FailedCall> {
         let device = self.device.raw();
         let (commands, fences) = ([self.commands], [self.fence]);
-        // SAFETY: the command buffer is recorded, what it names is borrowed by the caller, the fence is not in use.
+        // SAFETY: the command buffer is recorded, its objects are borrowed by the caller, the fence is not in use.
         let ended = unsafe {
             device
                 .reset_fences(&fences)

@@ -1,4 +1,4 @@
-//! What can be recorded into a command buffer.
+//! The commands of a command buffer.
 #![expect(unsafe_code, reason = "Vulkan's functions are foreign")]
 
 use std::marker::PhantomData;
@@ -10,7 +10,7 @@ use brickfield_core::glam::UVec3;
 use super::image::{WHOLE, extent_3d};
 use super::{BoundPipeline, Buffer, Canvas, HostBuffer, VulkanImage};
 
-/// Records commands; what they name is borrowed for `'a`.
+/// Records commands; their objects are borrowed for `'a`.
 pub(crate) struct Recorder<'q, 'a> {
     device: &'q ash::Device,
     commands: vk::CommandBuffer,
@@ -134,7 +134,7 @@ impl<'q, 'a> Recorder<'q, 'a> {
     /// Runs `n` workgroups along x, y, z.
     pub(crate) fn dispatch(&mut self, bound: &'a BoundPipeline<'a>, n: [u32; 3]) {
         let (pipeline, compute) = (bound.pipeline, vk::PipelineBindPoint::COMPUTE);
-        // SAFETY: the pipeline, its set and what is bound outlive the run; callers keep the number of workgroups within
+        // SAFETY: the pipeline, its set and the bound resources outlive the run; callers keep the number of workgroups within
         // 65,535, which every device allows.
         unsafe {
             self.device.cmd_bind_pipeline(self.commands, compute, pipeline.raw);
@@ -143,7 +143,7 @@ impl<'q, 'a> Recorder<'q, 'a> {
         }
     }
 
-    /// Draws triangles of `indices` into a canvas, over what is there.
+    /// Draws triangles of `indices` into a canvas, over the pixels that are there.
     pub(crate) fn draw(&mut self, bound: &'a BoundPipeline<'a>, canvas: &'a Canvas, triangles: Triangles<'a>) {
         let Triangles { corners, indices, range } = triangles;
         assert!(u64::from(range.end) * 4 <= indices.n_bytes(), "a draw past the end of the triangles");
@@ -163,7 +163,7 @@ impl<'q, 'a> Recorder<'q, 'a> {
             .render_pass(canvas.pass.raw)
             .framebuffer(canvas.framebuffer)
             .render_area(area);
-        // SAFETY: canvas, pipeline, its set, what is bound, and both buffers outlive the run. The pipeline was made for a pass
+        // SAFETY: canvas, pipeline, its set, the bound resources, and both buffers outlive the run. The pipeline was made for a pass
         // like the canvas's; indices are inside their buffer (asserted), and name corners that are there (`Polygons::hold` looks).
         unsafe {
             self.device.cmd_begin_render_pass(self.commands, &pass, vk::SubpassContents::INLINE);

@@ -74,7 +74,7 @@ impl<'a> Cells<'a> {
         Cells { blocks: Some(EmptyBlocks::new(volume, transfer)), ..Cells::new(volume) }
     }
 
-    /// The cells along a line, in order; those of transparent blocks are left out.
+    /// The cells along a line, in order; cells of transparent blocks are left out.
     pub(super) fn along<'b>(&'b self, line: &'b Line, span: Span) -> impl Iterator<Item = CellPath> + use<'a, 'b> {
         let mut at = span.start;
         let mut cell = self.cell_at(line, at, IVec3::splat(-1), self.last);

@@ -25,7 +25,7 @@ use piece::Pieces;
 pub struct ContinuousOptions {
     /// Quadrature error that a ray may have, absolute in each channel.
     pub tolerance: f64,
-    /// A ray ends when its transmittance falls below this; what it loses is part of its error.
+    /// A ray ends when its transmittance falls below this; the light that it loses is part of its error.
     pub transmittance_floor: f64,
 }
 
@@ -43,7 +43,7 @@ pub struct RayIntegral {
     pub rgba: [f64; 4],
     /// Optical depth up to where the ray ended.
     pub depth: f64,
-    /// What the quadrature and the ray's early end may be off by, in any channel: an estimate, usually far too large.
+    /// The error of the quadrature and of the ray's early end, in any channel: an estimate, usually far too large.
     pub error: f64,
     /// Smooth pieces that were integrated.
     pub n_pieces: u64,
@@ -62,7 +62,7 @@ pub struct Continuous {
 
 /// The emission-absorption integral of a volume's picture, over all threads of the current rayon pool.
 ///
-/// `clip` is a box in sample space; what lies in it and in the volume's box, [-1/2, N - 1/2), is integrated, from the eye
+/// `clip` is a box in sample space; its intersection with the volume's box, [-1/2, N - 1/2), is integrated, from the eye
 /// (or the eye's plane) on. Pixels are sampled at their centres.
 ///
 /// Accuracy: `options.tolerance`, and rounding of about 1e-16 for each piece of a ray; positions are held in sample space,

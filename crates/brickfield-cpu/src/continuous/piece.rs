@@ -6,7 +6,7 @@ use brickfield_optics::{alpha, transmittance};
 use super::ContinuousOptions;
 use super::cubic::Cubic;
 
-/// What a piece adds, as seen from its near end.
+/// The light of a piece, as seen from its near end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Piece {
     pub(super) depth: f64,
@@ -139,7 +139,7 @@ impl Medium {
 
     /// Integral of `weight` extinction e^-depth over a thin piece, by eight Gauss nodes: exact up to degree 15.
     ///
-    /// weight, extinction and depth are of degree 3, 3 and 4, so that only what e^-depth has beyond depth^2 / 2 can be wrong.
+    /// weight, extinction and depth are of degree 3, 3 and 4, so that only the terms of e^-depth beyond depth^2 / 2 can be wrong.
     /// The leading term of depth^3 / 6 is of degree 18, where eight nodes are wrong by 5e-8; a cubic with coefficients up to b
     /// leads with at most 8 b, the depth with 2 b.
     fn thin(&self, weight: &Cubic) -> Estimate {

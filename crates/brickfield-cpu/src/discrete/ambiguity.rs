@@ -8,7 +8,7 @@
 //! roundings of the numbers that decoding adds up.
 //!
 //! **Bound.** A segment that may have depth d' and emission e' instead of d and e changes a channel by at most
-//! T (|e' - e| + |e^-d' - e^-d|), T being the transmittance before it: what lies behind has colours of at most 1. Segments
+//! T (|e' - e| + |e^-d' - e^-d|), T being the transmittance before it: the light from behind has colours of at most 1. Segments
 //! change one after the other; T is taken with the least depths that the segments before may have. The sum is a bound.
 
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
@@ -28,7 +28,7 @@ pub(super) const TIE: f64 = 1e-6;
 /// Roundings of a number that decoding adds up, times the unit roundoff of f32.
 const ROUNDING: f64 = 8.0 / (1u32 << 24) as f64;
 
-/// What makes a plan's pixels ambiguous.
+/// The causes of ambiguity in a plan: kinds of blocks, jumps.
 pub(super) struct Ambiguity {
     several_kinds: bool,
     /// The values at which the transfer function jumps, ascending.
@@ -111,7 +111,7 @@ impl Ambiguity {
         bound
     }
 
-    /// The change by segments of nominal length whose middle is within rounding of where what is divided ends: they may count
+    /// The change by segments of nominal length whose middle is within rounding of an end of the divided span: they may count
     /// or not.
     fn appearing(&self, field: &impl FieldReader, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
         let plan = field.plan();

@@ -27,7 +27,7 @@ pub(super) fn spread(plan: &FramePlan, nodes: &[Values], part: CutSegment) -> (f
     (change, least)
 }
 
-/// The most by which a channel changes that has one segment instead of another, whatever lies behind them.
+/// The most by which a channel changes that has one segment instead of another, with any light behind them.
 pub(super) fn difference(a: &Segment, b: &Segment) -> f64 {
     let emission = a.emission.iter().zip(b.emission).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
     emission + (transmittance(a.depth) - transmittance(b.depth)).abs()

@@ -1,7 +1,7 @@
 //! The discrete f64 answer: the very sum that a plan asks for, node by node.
 //!
 //! Written from the rules of ARCHITECTURE.md ("What a plan means"), not from a shader. It visits every segment of a ray's
-//! span in the domain: nothing is jumped over and no ray ends early, so that those who do can be judged by it.
+//! span in the domain: nothing is jumped over and no ray ends early, so that renderers that do can be judged by it.
 
 mod ambiguity;
 mod change;
@@ -21,7 +21,7 @@ use field::{FieldReader, Float32, Shared, Stored, Unorm8, Unorm16};
 pub use rounding::{filter_rounding, position_rounding};
 use walk::{CutSegment, clip, parts};
 
-/// What a plan's sum is, and how far f32 may stray from it where the field jumps.
+/// The sum of a plan, and how far f32 may stray from it where the field jumps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Discrete {
     /// Linear, premultiplied RGBA.
@@ -34,9 +34,9 @@ pub struct Discrete {
     /// A ray that runs within rounding of the domain's surface may also be missed or hit: then it is the opacity of the
     /// most that such a ray could gather.
     pub ambiguity: Vec<f64>,
-    /// Nodes of all segments in the domain: what the plan evaluates without skipping.
+    /// Nodes of all segments in the domain: the number of evaluations without skipping.
     pub n_samples: u64,
-    /// Those of them whose extinction is above 0.
+    /// The nodes whose extinction is above 0.
     pub n_visible_samples: u64,
     /// For each pixel, rows from the top: the segments whose depth is above 0.
     pub visible_segments: Vec<u32>,

@@ -1,4 +1,4 @@
-//! By how much a pixel may change because its nodes' values are not exactly those of the plan.
+//! By how much a pixel may change because its nodes' values are not exactly the plan's.
 //!
 //! **Positions.** A position in f32 is the sum of terms as large as the volume (see `RayFrame::rounding`), each rounded: along an
 //! axis it is off by about 2^-24 * (|center| + |anchor| + |direction| (|t| + |t_anchor|)), one roundoff of each. The interpolated
@@ -10,7 +10,7 @@
 //! difference along that axis, so all three by at most 3 2^-b R, R being the range of the cell's eight samples.
 //!
 //! **Codes.** Texture units may filter 8-bit texels in 8-bit arithmetic (llvmpipe does): each of the three steps of
-//! interpolation then rounds to the nearest code: at most [`CODES`] codes in all, whatever R is.
+//! interpolation then rounds to the nearest code: at most [`CODES`] codes in all, for any R.
 //!
 //! **Pixel.** A node whose value may lie anywhere in v +- dv may have any extinction and colour that the transfer function has
 //! there: this is where its slope enters, exactly and on both sides of knots and jumps. A segment changes the pixel by at most
@@ -35,14 +35,14 @@ const CODES: f64 = 1.5;
 /// Extinction and colour are extreme at the candidates; of wide ranges their product may pass its ends by second order.
 const SECOND_ORDER: f64 = 1.05;
 
-/// For each pixel, rows from the top: what one rounding of each term of its nodes' positions may change, in any channel.
+/// For each pixel, rows from the top: the change, in any channel, by one rounding of each term of its nodes' positions.
 ///
 /// Cost: several times that of [`discrete`](crate::discrete()).
 pub fn position_rounding(plan: &FramePlan) -> Vec<f64> {
     of_plan(plan, Cause::Positions)
 }
 
-/// For each pixel, rows from the top: what a texture unit that filters with weights of `sub_texel_bits` bits may change, in any
+/// For each pixel, rows from the top: the change by a texture unit that filters with weights of `sub_texel_bits` bits, in any
 /// channel.
 ///
 /// Cost: several times that of [`discrete`](crate::discrete()).

@@ -2,8 +2,8 @@
 //!
 //! Where segments end with their brick, such a ray has the segments of the brick that f32 puts it in, and it may cross the face,
 //! which cuts a segment, anywhere. Piece by piece, between surfaces of the coarsest level: the light that the ray has there is
-//! held against what it has in any of the blocks beside it; and two cuts through the middle of a segment are added, one where
-//! the ray crosses the face, one where it might. What is too short to hold [`LITTLE`] is left out.
+//! held against its values in each of the blocks beside it; and two cuts through the middle of a segment are added, one where
+//! the ray crosses the face, one where it might. Segments too short to hold [`LITTLE`] are left out.
 
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Aabb, Level, Span};
@@ -16,7 +16,7 @@ use super::walk::{CutSegment, parts_in_block, segments};
 use super::{part_values, segment};
 use crate::blocks::{Blocks, Crossing};
 
-/// An optical depth that is less than what the rules of exact mode allow.
+/// An optical depth that is less than the tolerance of exact mode.
 const LITTLE: f64 = 1e-5;
 
 /// How much the light along some of a ray may change, and by how much its depth may be less.
@@ -88,7 +88,7 @@ fn ways_beside(plan: &FramePlan, ray: &PlanRay, along: Span, delta: DVec3) -> Ve
     (0..8).map(|corner| Blocks::new(plan, &beside(corner), along).collect()).collect()
 }
 
-/// What changes along a span if its blocks are crossed in any of other ways.
+/// The change along a span if its blocks are crossed in any of other ways.
 fn change_along(
     field: &impl FieldReader,
     ray: &PlanRay,

@@ -20,7 +20,7 @@ pub(super) enum Syntax {
     Implicit,
 }
 
-/// What is missing where a file ends within its meta group.
+/// The missing part where a file ends within its meta group.
 pub(super) const META_END: &str = "the end of the file meta group";
 const UNDEFINED: u32 = u32::MAX;
 const ITEM: (u16, u16) = (0xfffe, 0xe000);
@@ -39,7 +39,7 @@ struct ElementHeader {
 const MAX_DEPTH: usize = 32;
 
 /// Checks from the current position to the end of the pixel data that no element is longer than the source, and that
-/// sequences are not nested without end. Returns the position after what was checked: the parser must not go beyond.
+/// sequences are not nested without end. Returns the position after the checked elements: the parser must not go beyond.
 pub(super) fn check_lengths(source: &mut dyn ByteSource, syntax: Syntax) -> Result<u64, ReadError> {
     let n_unchecked = walk(source, syntax)?;
     let end = source.stream_position().map_err(|e| ReadError::io("the data set", e))? + n_bytes_left(source)?;
@@ -199,7 +199,7 @@ fn has_short_form(vr: [u8; 2]) -> bool {
     SHORT.chunks(3).any(|known| known[..2] == vr)
 }
 
-/// What the dictionary has, where value representations are implicit.
+/// The dictionary's value representation, where value representations are implicit.
 fn standard_vr((group, element): (u16, u16)) -> VR {
     StandardDataDictionary.by_tag(Tag(group, element)).map_or(VR::UN, |e| e.vr().relaxed())
 }

@@ -19,12 +19,12 @@ use slice::Slice;
 
 /// Reads the largest series among the named files; the world is the patient's, left-posterior-superior.
 ///
-/// Values are rescaled to what the modality means (Hounsfield units). A rescale by integers keeps integers, in the
+/// Values are rescaled to the modality's unit (Hounsfield units). A rescale by integers keeps integers, in the
 /// stored type if they fit, else in the first of i16, u16, i32, u32 that they fit; others give f32, or f64 for stored
 /// 32-bit integers.
 ///
 /// # Errors
-/// What [`ReadError`] lists. In a folder, files that are no slices are skipped with a note; if none is left, the first
+/// As [`ReadError`] lists them. In a folder, files that are no slices are skipped with a note; if none is left, the first
 /// one's error is returned.
 pub fn read(names: &[String], files: &dyn DataFiles, limits: &Limits) -> Result<Opened, ReadError> {
     let mut found = FileFacts::plain(Format::Dicom);
@@ -67,7 +67,7 @@ fn read_headers(names: &[String], files: &dyn DataFiles, notes: &mut Vec<Note>) 
     Ok(slices)
 }
 
-/// Whether a DICOM file ends too early or states what cannot be; other files are no slices.
+/// Whether a DICOM file ends too early or states impossible numbers; other files are no slices.
 fn is_damage(fault: &ReadError) -> bool {
     use ReadError::{EndsWithin, Field, Missing, Truncated};
     matches!(fault, Field { .. } | EndsWithin { .. } | Truncated { .. } | Missing { field: elements::META_END })

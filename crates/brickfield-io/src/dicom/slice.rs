@@ -1,4 +1,4 @@
-//! What one file says about its slice.
+//! One file's statements about its slice.
 
 use std::io::{Read, SeekFrom};
 
@@ -29,7 +29,7 @@ pub(super) struct Slice {
     pub(super) orientation: Option<[DVec3; 2]>,
     /// World units between columns and between rows.
     pub(super) pixel_spacing: Option<[f64; 2]>,
-    /// What the file states about the step to the next slice, for want of positions.
+    /// The step to the next slice as the file states it, for want of positions.
     pub(super) stated_step: Option<f64>,
     pub(super) rescale: Rescale,
 }

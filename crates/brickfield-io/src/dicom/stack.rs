@@ -32,7 +32,7 @@ fn key(slice: &Slice) -> (String, u64, u64, &'static str, Option<[i64; 6]>) {
     (slice.series.clone(), slice.columns, slice.rows, slice.scalar.name(), orientation)
 }
 
-/// Slices by position along their normal, without those that lie where another does; else by instance number.
+/// Slices by position along their normal, one for each position; else by instance number.
 pub(super) fn sorted(mut slices: Vec<Slice>, notes: &mut Vec<Note>) -> Vec<Slice> {
     let n_slices = slices.len();
     let Some(normal) = normal(&slices) else {

@@ -27,7 +27,7 @@ use space::Space;
 /// [`WorldFrame::Lps`](crate::WorldFrame::Lps); others stay as they are. `space origin` is the first sample's centre.
 ///
 /// # Errors
-/// What [`ReadError`] lists: a header that is wrong, unsupported or beyond the limits; data that are missing.
+/// As [`ReadError`] lists them: a header that is wrong, unsupported or beyond the limits; data that are missing.
 pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, limits: &Limits) -> Result<Opened, ReadError> {
     read_from(&mut input, files, limits)
 }

@@ -31,7 +31,7 @@ pub fn save(path: &Path, volume: &Volume, frame: WorldFrame, encoding: NrrdEncod
 /// Writes a volume as attached NRRD.
 ///
 /// # Errors
-/// What `out` reports.
+/// The errors of `out`.
 pub fn write(mut out: impl Write, volume: &Volume, frame: WorldFrame, encoding: NrrdEncoding) -> io::Result<()> {
     out.write_all(header(volume, frame, encoding).as_bytes())?;
     match encoding {

@@ -11,7 +11,7 @@ use crate::ReadError;
 use crate::deflate::damage;
 use crate::error::bytes;
 
-/// What compresses the bytes of a chunk, or of the parts of a shard.
+/// The codec of the bytes of a chunk, or of the parts of a shard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Compressor {
     None,
@@ -173,7 +173,7 @@ fn check_stream(compressor: Compressor, stored: &[u8], max_bytes: u64, what: &st
     Ok(())
 }
 
-/// Bytes that come out, counted up to one more than allowed and not kept; on a fault, those that came before.
+/// Bytes that come out, counted up to one more than allowed and not kept; on a fault, the bytes that came before.
 fn n_unpacked(decoder: impl Read, max_bytes: u64) -> Result<u64, (u64, io::Error)> {
     let mut unpacked = decoder.take(max_bytes.saturating_add(1));
     let (mut n_bytes, mut chunk) = (0, [0; 8192]);
@@ -186,7 +186,7 @@ fn n_unpacked(decoder: impl Read, max_bytes: u64) -> Result<u64, (u64, io::Error
     }
 }
 
-/// What the header of a blosc buffer claims; the decoder allocates and checks by it.
+/// The claims of a blosc buffer's header; the decoder allocates and checks by them.
 fn blosc_bytes(stored: &[u8]) -> u64 {
     stored.get(4..8).and_then(|b| b.try_into().ok()).map_or(0, |b| u64::from(u32::from_le_bytes(b)))
 }

@@ -43,7 +43,7 @@ struct Reader<'a> {
     volume_axes: VolumeAxes,
     dims: [u64; 3],
     n_chunks: u64,
-    /// Those that are not stored, and have the fill value.
+    /// Chunks that are not stored, and have the fill value.
     n_missing: u64,
 }
 

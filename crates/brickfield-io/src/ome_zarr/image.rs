@@ -48,7 +48,7 @@ impl ZarrImage {
         Ok(image)
     }
 
-    /// Applies a list of transformations after those that are there.
+    /// Applies a list of transformations after the earlier ones.
     fn transform(&mut self, transformations: &Value) -> Result<(), ReadError> {
         for transformation in transformations.as_array().into_iter().flatten() {
             match transformation["type"].as_str() {
@@ -86,7 +86,7 @@ impl ZarrImage {
         })
     }
 
-    /// Finds x, y and z by name; notes what is left out of longer other axes.
+    /// Finds x, y and z by name; notes the parts that are left out of longer other axes.
     pub(super) fn volume_axes(&self, shape: &[u64], notes: &mut Vec<Note>) -> Result<VolumeAxes, ReadError> {
         if shape.len() != self.axes.len() {
             let expected = format!("{}, as the image has axes", self.axes.len());

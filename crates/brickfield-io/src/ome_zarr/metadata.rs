@@ -93,7 +93,7 @@ impl ArrayMetadata {
         samples.saturating_mul(self.scalar.n_bytes() as u128)
     }
 
-    /// Holds the size of a chunk and the number of chunks against what is sensible.
+    /// Holds the size of a chunk and the number of chunks against sensible bounds.
     pub(super) fn check_chunks(&self, limits: &Limits) -> Result<(), ReadError> {
         check_bytes(self.chunk_bytes(), limits, || format!("a chunk of shape {:?}", self.chunk_shape))?;
         let per_axis = self.shape.iter().zip(&self.chunk_shape).map(|(n, chunk)| u128::from(n.div_ceil(*chunk)));

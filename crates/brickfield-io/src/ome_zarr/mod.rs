@@ -30,7 +30,7 @@ use metadata::ArrayMetadata;
 /// is the spacing, the translation is the first sample's centre. Chunks that are not stored have the fill value.
 ///
 /// # Errors
-/// What [`ReadError`] lists: metadata that are wrong, unsupported or beyond the limits; chunks that cannot be decoded.
+/// As [`ReadError`] lists them: metadata that are wrong, unsupported or beyond the limits; chunks that cannot be decoded.
 pub fn read(folder: &Path, limits: &Limits) -> Result<Opened, ReadError> {
     let store = FilesystemStore::new(folder).map_err(|e| ReadError::decoder("the folder", e))?;
     read_store(Arc::new(store), limits)

@@ -1,4 +1,4 @@
-//! What ImageJ and OME-TIFF write into the description of the first page.
+//! The description of the first page, as ImageJ and OME-TIFF write it.
 
 /// How pages are numbered.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,7 +8,7 @@ use ::tiff::tags::{IfdPointer, Tag};
 use super::PageDecoder;
 use crate::ReadError;
 
-/// What names pages in errors. They are counted from 0 here, and from 1 in the text.
+/// The names of pages in errors. They are counted from 0 here, and from 1 in the text.
 pub(super) struct PageNames {
     pub(super) n_file_bytes: u64,
     /// From the description until the pages have been counted.

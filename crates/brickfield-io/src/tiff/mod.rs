@@ -30,7 +30,7 @@ use tags::check_tags;
 /// Reads a TIFF stack; the outer corner of the first voxel is the world's origin.
 ///
 /// # Errors
-/// What [`ReadError`] lists: pages that are wrong, unsupported, unlike each other or beyond the limits.
+/// As [`ReadError`] lists them: pages that are wrong, unsupported, unlike each other or beyond the limits.
 pub fn read(mut input: impl BufRead + Seek, limits: &Limits) -> Result<Opened, ReadError> {
     guarded("TIFF", || read_from(&mut input, limits))
 }
@@ -78,7 +78,7 @@ fn header_limits() -> TiffLimits {
     limits
 }
 
-/// What must be alike in all slices.
+/// The properties that must be alike in all slices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Page {
     width: u32,

@@ -44,7 +44,7 @@ pub(super) fn check_tags(source: &mut dyn ByteSource, names: &PageNames) -> Resu
     Ok(())
 }
 
-/// What is known of the first directory (TIFF 6.0, section 2; BigTIFF has wider counts and offsets).
+/// The start and the longest tag of the first directory (TIFF 6.0, section 2; BigTIFF has wider counts and offsets).
 #[derive(Default)]
 struct Directory {
     start: Option<u64>,
@@ -53,7 +53,7 @@ struct Directory {
 }
 
 impl Directory {
-    /// On an error, what has been read so far is known.
+    /// On an error, the numbers that were read before it are kept.
     fn read(&mut self, source: &mut dyn ByteSource) -> io::Result<()> {
         let mut order = [0; 2];
         source.read_exact(&mut order)?;

@@ -1,4 +1,4 @@
-//! What precedes binary data, and zlib blocks.
+//! The header of binary data, and zlib blocks.
 
 use std::io::{self, Read};
 
@@ -67,7 +67,7 @@ pub(super) struct ZlibBlocks<'a> {
     sizes: Vec<(u64, u64)>,
     block: Vec<u8>,
     n_given: usize,
-    /// What is wrong after the bytes of the block, which are given all the same.
+    /// The fault after the bytes of the block, which are given all the same.
     fault: Option<io::Error>,
 }
 

@@ -66,7 +66,7 @@ pub(super) struct Document {
     cut_off_at: Option<u64>,
 }
 
-/// What an element asks of the reader.
+/// The step that an element asks of the reader.
 enum Next {
     Go,
     SkipText,
@@ -95,7 +95,7 @@ impl Document {
         }
     }
 
-    /// What is not there, or would have been if the file went on.
+    /// The error of a part that is not there, or would have been if the file went on.
     pub(super) fn missing(&self, field: &'static str) -> ReadError {
         match self.cut_off_at {
             None => ReadError::Missing { field },
@@ -339,7 +339,7 @@ fn several<T: std::str::FromStr, const N: usize>(
     values.try_into().map(Some).map_err(|_| ReadError::field(name, text, format!("{N} numbers")))
 }
 
-/// A source that gives only so many bytes of XML; what is skipped does not count.
+/// A source that gives only so many bytes of XML; skipped bytes do not count.
 struct Metered<'a> {
     source: &'a mut dyn ByteSource,
     n_bytes_left: u64,

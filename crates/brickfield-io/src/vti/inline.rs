@@ -54,7 +54,7 @@ pub(super) struct Base64Reader<R> {
     text: R,
     decoded: Vec<u8>,
     n_given: usize,
-    /// What is wrong after the decoded bytes, which are given all the same.
+    /// The fault after the decoded bytes, which are given all the same.
     fault: Option<Damage>,
 }
 
@@ -93,7 +93,7 @@ fn decode_runs(mut symbols: &[u8], out: &mut Vec<u8>) -> Result<(), Damage> {
     Ok(())
 }
 
-/// Decodes a run; of a wrong one, the quads before what is wrong.
+/// Decodes a run; of a wrong one, the quads before the fault.
 fn decode_run(run: &[u8], out: &mut Vec<u8>) -> Result<(), Damage> {
     let n_before = out.len();
     let Err(fault) = ENGINE.decode_vec(run, out) else { return Ok(()) };

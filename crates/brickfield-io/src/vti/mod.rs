@@ -29,7 +29,7 @@ use inline::{Base64Reader, UntilTag};
 /// Cell values are samples at cell centres. The world is the file's own.
 ///
 /// # Errors
-/// What [`ReadError`] lists: a document that is wrong, unsupported or beyond the limits; data that are missing.
+/// As [`ReadError`] lists them: a document that is wrong, unsupported or beyond the limits; data that are missing.
 pub fn read(mut input: impl BufRead + Seek, limits: &Limits) -> Result<Opened, ReadError> {
     read_from(&mut input, limits)
 }

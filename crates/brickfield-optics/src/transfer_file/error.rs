@@ -1,4 +1,4 @@
-//! What can be wrong with a transfer-function file.
+//! The errors of a transfer-function file.
 
 use std::io;
 use std::path::PathBuf;
@@ -33,7 +33,7 @@ pub enum ParseTransferError {
     Transfer { line: usize, source: TransferError },
 }
 
-/// What is wrong with one knot of a file.
+/// The error of one knot of a file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)]

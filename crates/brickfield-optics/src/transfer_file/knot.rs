@@ -1,4 +1,4 @@
-//! Knots as files have them, and what they mean.
+//! Knots as files have them, and their meaning.
 
 use brickfield_core::{Knot, LinearRgb, TransferError, TransferFunction};
 use serde::Deserialize;

@@ -78,7 +78,7 @@ fn read_text(path: &Path) -> Result<String, ReadTransferError> {
 /// A transfer function from text.
 ///
 /// # Errors
-/// Bad syntax, a knot with too little, too much or what is out of range, knots out of order; each with its line.
+/// Bad syntax, a knot with too few or too many numbers or a number out of range, knots out of order; each with its line.
 pub fn parse_transfer(text: &str, format: TransferFormat) -> Result<TransferFunction, ParseTransferError> {
     let text = text.trim_start_matches('\u{feff}');
     match format {

@@ -40,7 +40,7 @@ pub struct TreeOptions {
     pub downsampling: Downsampling,
 }
 
-/// What of a volume is shown, and how.
+/// The part of a volume that is shown, and how.
 #[derive(Args, Clone, Debug)]
 pub struct ViewOptions {
     /// Size of the picture in pixels
@@ -87,9 +87,9 @@ pub struct Background(pub LinearRgb);
 /// Which bricks are shown as boxes over a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Boxes {
-    /// Those that the frame draws.
+    /// The bricks that the frame draws.
     Drawn,
-    /// Those, and fainter the selected ones in which nothing is visible.
+    /// The bricks that the frame draws, and fainter the selected ones in which nothing is visible.
     All,
 }
 
@@ -132,7 +132,7 @@ pub struct SamplingOptions {
 pub struct Subject {
     /// The volume.
     pub volume: Volume,
-    /// What is known of the world's axes.
+    /// The names of the world's axes, where they are known.
     pub frame: WorldFrame,
     /// Its bricks at all resolutions.
     pub tree: BrickTree,

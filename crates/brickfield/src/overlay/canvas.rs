@@ -28,7 +28,7 @@ impl LinePicture {
         LinePicture { image: image.clone(), coverage: Pixmap::new(image.size().x, image.size().y) }
     }
 
-    /// Lines over what is there: where several cross, only once.
+    /// Lines over the picture: where several cross, only once.
     pub(super) fn stroke(&mut self, lines: &[[DVec2; 2]], ink: &Ink) {
         let (Some(coverage), Some(path)) = (&mut self.coverage, path(lines)) else { return };
         let mut white = Paint::default();

@@ -23,7 +23,7 @@ struct EdgePiece {
     minus_level: i16,
 }
 
-/// The edges of the boxes of bricks, the finest level first. No two lie on each other; those of a level that follow each other
+/// The edges of the boxes of bricks, the finest level first. No two lie on each other; edges of a level that follow each other
 /// are one.
 pub(super) fn edges(layout: &BrickLayout, bricks: &[BrickId]) -> Vec<Edge> {
     let mut pieces: Vec<EdgePiece> = bricks.iter().flat_map(|id| pieces(*id, &layout.index_box(*id))).collect();
@@ -50,7 +50,7 @@ fn pieces(id: BrickId, b: &Aabb) -> impl Iterator<Item = EdgePiece> + use<> {
     })
 }
 
-/// What is left of a line's pieces without those on which others lie.
+/// The pieces of a line without the parts on which other pieces lie.
 fn along_a_line(pieces: &[EdgePiece]) -> Vec<EdgePiece> {
     let mut left: Vec<EdgePiece> = Vec::new();
     for piece in pieces {
@@ -113,7 +113,7 @@ mod tests {
     }
 
     proptest! {
-        /// Every point of every brick's edges lies on exactly one of what is left.
+        /// Every point of every brick's edges lies on exactly one of the pieces that are left.
         #[test]
         fn every_edge_is_drawn_exactly_once(dims in [2u32..70, 2u32..50, 2u32..40], deep in 0usize..64, along in 0.0..1.0) {
             let layout = BrickLayout::new(UVec3::from(dims), BrickSide::S16);

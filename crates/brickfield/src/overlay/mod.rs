@@ -1,6 +1,6 @@
 //! Lines over pictures: which bricks a frame draws, and where a camera stands.
 //!
-//! Lines have no depth: what is drawn hides none of them. A picture with an overlay is for looking, not for measuring.
+//! Lines have no depth: the volume hides none of them. A picture with an overlay is for looking, not for measuring.
 
 mod canvas;
 mod edges;
@@ -17,13 +17,13 @@ use projector::CameraProjector;
 /// The colour of a level's bricks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LevelColor {
-    /// What people call it.
+    /// The colour's common name.
     pub name: &'static str,
     /// As sRGB.
     pub srgb: [u8; 3],
 }
 
-/// The colours of levels 0 to 6; those above begin again.
+/// The colours of levels 0 to 6; levels above begin again.
 ///
 /// They are the seven of Okabe and Ito 2008 ("Color Universal Design") that are not black, which colour-blind people tell apart.
 pub const LEVEL_COLORS: [LevelColor; 7] = [
@@ -50,9 +50,9 @@ impl LevelColor {
     }
 }
 
-/// How much of what lies behind the lines of transparent bricks they hide, in terms of those of others.
+/// The opacity of the lines of transparent bricks, relative to the lines of other bricks.
 const FAINT: f64 = 0.35;
-/// The lines of cameras, and what sets them off from any picture.
+/// The lines of cameras, and the halo that sets them off from any picture.
 const CAMERA_INK: Ink = Ink { color: [0.0; 3], opacity: 1.0, width: 1.25 };
 const CAMERA_HALO: Ink = Ink { color: [1.0; 3], opacity: 0.7, width: 3.25 };
 
@@ -60,7 +60,7 @@ const CAMERA_HALO: Ink = Ink { color: [1.0; 3], opacity: 0.7, width: 3.25 };
 ///
 /// An edge has the [`LevelColor`] of the coarsest brick that has it, and is drawn once. The finer the level, the thinner and
 /// lighter: 0.75 + level / 4 pixels wide (at most 2) and opaque by 0.6 + level / 8 (at most 1) in a picture up to 512 pixels high;
-/// in higher ones lines are wider in proportion. What lies behind the eye is not drawn.
+/// in higher ones lines are wider in proportion. Edges behind the eye are not drawn.
 ///
 /// Composited over the picture in linear light; a pixel that no line crosses is the same to the bit.
 pub fn show_bricks(
@@ -94,7 +94,7 @@ fn show(
 ) -> Image<f32> {
     let projector = CameraProjector::new(camera, image.size());
     let mut canvas = LinePicture::new(image);
-    // The finest first: those of coarser levels lie over them.
+    // The finest first: lines of coarser levels lie over them.
     for of_level in edges(layout, bricks).chunk_by(|a, b| a.level == b.level) {
         let world = |p: DVec3| grid.world(IndexPos(p)).0;
         let lines: Vec<_> = of_level.iter().filter_map(|e| projector.line(e.ends.map(world))).collect();
@@ -123,7 +123,7 @@ pub fn show_camera(image: &Image<f32>, camera: &Camera, of: &Camera, of_size: UV
     canvas.into_image()
 }
 
-/// The edges of what a camera sees, in the world.
+/// The edges of a camera's field of view, in the world.
 fn pyramid(of: &Camera, size: UVec2, length_world: f64) -> Vec<[DVec3; 2]> {
     let (rays, size) = (of.pixel_rays(size), size.as_dvec2());
     let at = |distance: f64, x: f64, y: f64| {
@@ -220,7 +220,7 @@ mod tests {
         let (grid, layout, bricks) = scene();
         let camera = look([8.0, 9.0, 10.0], [15.4, 15.6, 15.5], PERSPECTIVE);
         let shown = show_bricks(&picture(), &camera, &grid, &layout, &bricks);
-        // The three edges at the corner that it looks at, and what hides behind them: a small part of the picture.
+        // The three edges at the corner that it looks at, and the edges that hide behind them: a small part of the picture.
         let n = n_changed(&shown, &picture());
         assert!((50..1500).contains(&n), "{n}");
         assert!(shown.pixels().iter().flatten().all(|c| c.is_finite()));

@@ -7,13 +7,13 @@ use brickfield_core::{Camera, PixelRays};
 pub(super) struct CameraProjector {
     camera: Camera,
     rays: PixelRays,
-    /// Half of what is kept of the plane at distance 1 (parallel rays: of the eye's plane): the picture, and a margin around it.
+    /// Half the size of the window in the plane at distance 1 (parallel rays: in the eye's plane): the picture, and a margin around it.
     half: DVec2,
 }
 
 /// Pixels around the picture, for the width of lines.
 const MARGIN_PIXELS: f64 = 200.0;
-/// What is nearer to the eye than this share of a line's farther end is cut off.
+/// The part of a line that is nearer to the eye than this share of its farther end is cut off.
 const NEAR: f64 = 1e-6;
 
 impl CameraProjector {
@@ -51,13 +51,13 @@ impl CameraProjector {
         DVec3::new(p.dot(self.camera.right()), p.dot(self.camera.up()), p.dot(self.camera.forward()))
     }
 
-    /// How far inside of each plane around what is kept a position is.
+    /// How far a position is inside of each plane around the window.
     fn sides(&self, p: DVec3, near: f64) -> [f64; 5] {
         let limit = self.half * self.scale(p);
         [p.z - near, limit.x - p.x, limit.x + p.x, limit.y - p.y, limit.y + p.y]
     }
 
-    /// What plane coordinates are to be multiplied by at a position.
+    /// The factor of plane coordinates at a position.
     fn scale(&self, p: DVec3) -> f64 {
         if self.is_perspective() { p.z } else { 1.0 }
     }

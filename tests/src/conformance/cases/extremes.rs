@@ -1,4 +1,4 @@
-//! What must stay finite, bounded and equal on all backends at the ends of every range.
+//! Pictures that must stay finite, bounded and equal on all backends at the ends of every range.
 
 use brickfield_core::glam::{DMat3, DVec3, UVec2, UVec3};
 use brickfield_core::{Grid, ScalarType, TransferFunction, Volume};
@@ -15,7 +15,7 @@ pub(super) fn cases() -> Vec<Case> {
     [depths(), voxels(), shapes(), places(), long_rays()].into_iter().flatten().collect()
 }
 
-/// tau h from 1e-12 to 1e12, and what lies between on one ray.
+/// tau h from 1e-12 to 1e12, with all values between on one ray.
 fn depths() -> Vec<Case> {
     let thin = |tau: f64| move || Setup::new(constant(&grid(), ScalarType::U8, 0.4), transfer(tau));
     let scaled = |top: f64, rule| {
@@ -90,7 +90,7 @@ fn voxels() -> Vec<Case> {
         picture("extreme/offset-1e9", catches![DecodeOffset, KnotMoved], move || {
             Setup::new(offset(), over(1e9 + 0.2, 1e9 + 0.9))
         }),
-        // Seven of 65,536 values, in the middle, where a fraction has too few digits for what lies between two of them.
+        // Seven of 65,536 values, in the middle, where a fraction has too few digits for a value between two of them.
         picture("extreme/16-bits-narrow", catches![shader::FRACTIONS_OF_16_BITS, KnotMoved], move || {
             let honest = hills(&grid(), ScalarType::F32);
             let counts = (0..honest.voxels().len()).map(|i| (8.0 * (honest.voxels().at(i) - 0.5)).round() as i16);

@@ -81,7 +81,7 @@ pub(super) fn shell(grid: &Grid, scalar: ScalarType) -> Volume {
     fill_unit(grid, scalar, |p| field.at(p))
 }
 
-/// A ball without a rim: dark values outside, other dark ones inside, for what sees the values between.
+/// A ball without a rim: dark values outside, other dark ones inside; interpolation and rules that see the values between show.
 pub(super) fn jump(grid: &Grid) -> Volume {
     let center = grid.world_box().center() + 0.3;
     let r = 0.35 * grid.world_box().extent().min_element();
@@ -98,7 +98,7 @@ pub(super) fn sparse(grid: &Grid, scalar: ScalarType) -> Volume {
     fill_unit(grid, scalar, |p| near.at(p) + far.at(p))
 }
 
-/// Bricks of 16 that are full up to their borders beside empty ones: what a jump over an empty one misses shows at once.
+/// Bricks of 16 that are full up to their borders beside empty ones: a jump that goes too far over an empty one shows at once.
 pub(super) fn checkers(dims: UVec3) -> Volume {
     let grid = Grid::axis_aligned(dims, DVec3::ONE).expect("a grid");
     fill_unit(&grid, ScalarType::U8, |p| {

@@ -2,7 +2,7 @@
 //!
 //! Inputs are f32, so equations are evaluated at the very number that the function sees. Tolerances: scalar functions 3e-6
 //! relative (exp is allowed 3 + 2|x| ulp in WGSL, and beyond depth 20 nothing is left of it) and 1e-30 absolute (denormals
-//! may be flushed); classification 2e-6 of the function's greatest extinction, plus what a value's rounding does at the
+//! may be flushed); classification 2e-6 of the function's greatest extinction, plus the effect of a value's rounding at the
 //! function's greatest slope; segments the same for their alpha; sampled values 4e-6 of the field's range; rays 4e-6 of the
 //! volume's size.
 

@@ -1,4 +1,4 @@
-//! Brick sides, coarser levels, cuts of several levels, and what is left out.
+//! Brick sides, coarser levels, cuts of several levels, and empty blocks.
 
 use brickfield::bricks::Downsampling;
 use brickfield::lod::Criterion;
@@ -88,7 +88,7 @@ fn mixed() -> Vec<Case> {
                 .detail_reproduced(distance(1.0))
                 .eye(DVec3::new(-6.0, -14.0, 20.0), DVec3::new(30.0, 30.0, 15.0))
         }),
-        // Coarse voxels across the edge between two dark values see what lies between them; fine ones see the edge itself.
+        // Coarse voxels across the edge between two dark values see the values between; fine ones see the edge itself.
         picture("cut/dark-on-both-sides", catches![WrongLevel, shader::LEVEL_SCALE], || {
             let grid = Grid::axis_aligned(UVec3::new(71, 66, 53), DVec3::ONE).expect("a grid");
             let edge = |i: usize| if i % 71 <= 30 { 51u8 } else { 230 };
@@ -118,7 +118,7 @@ fn skipping() -> Vec<Case> {
         Setup::new(checkers(UVec3::new(71, 66, 53)), transfer)
     };
     let rule = |rule: QuadratureRule| {
-        // Pre-integration keeps a margin of bricks around what is visible: a jump may go too far there unseen.
+        // Pre-integration keeps a margin of bricks around visible ones: a jump may go too far there unseen.
         let mutants = match rule {
             QuadratureRule::PreIntegrated => catches![VisibleTooSmall, BrickTransparent],
             _ => catches![VisibleTooSmall, shader::JUMPS_TOO_FAR, ExtinctionScaled],
@@ -151,7 +151,7 @@ fn skipping() -> Vec<Case> {
             cases.push(case);
         }
     }
-    // Both nodes of a long segment may be dark and what lies between them not.
+    // Both nodes of a long segment may be dark, and values between them visible.
     for rule in [QuadratureRule::PreIntegrated, QuadratureRule::Gauss2] {
         let mutants = catches![shader::FAR_NODE_FORGOTTEN, RowsFlipped];
         let case = picture(format!("skip/dark-on-both-sides-{}", rule.name()), mutants, move || {

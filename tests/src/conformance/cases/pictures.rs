@@ -84,7 +84,7 @@ fn fields() -> Vec<Case> {
     ]
 }
 
-/// Every scalar type: what its bytes and its decoding can get wrong.
+/// Every scalar type: errors of its bytes and its decoding.
 fn types() -> Vec<Case> {
     let one = |scalar: ScalarType| {
         let integer: Vec<Mutant> = match scalar {

@@ -107,7 +107,7 @@ fn of_several_levels() -> Vec<Case> {
     placements.into_iter().chain(rules).chain([inside]).collect()
 }
 
-/// The paper's own form: what its pictures lack, as it lacks it.
+/// The paper's own form, nominal lengths: its pictures lack the same light.
 fn nominal() -> Vec<Case> {
     let mut cases = Vec::new();
     for (placement, _) in PLACEMENTS {

@@ -1,4 +1,4 @@
-//! How a case states its scene: volume and transfer function, then what differs from the defaults.
+//! How a case states its scene: volume and transfer function, then the settings that differ from the defaults.
 
 use brickfield::Scene;
 use brickfield::bricks::{BuildOptions, Downsampling, build_tree};

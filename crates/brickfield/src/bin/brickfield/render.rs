@@ -14,7 +14,7 @@ use brickfield::{
 use crate::{Failure, RenderArgs, print};
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
-    // What can be refused is refused before any work is done.
+    // Options that can be refused are refused before any work is done.
     check_picture_path(&args.out).map_err(Failure::usage)?;
     let mut backend = open(args)?;
     let subject = Subject::open(&args.file, &args.input, &args.tree, &args.view)?;
@@ -60,7 +60,7 @@ fn open(args: &RenderArgs) -> Result<Box<dyn Backend>, Failure> {
 /// The bricks whose boxes are shown over the picture.
 struct ShownBricks<'a> {
     drawn: &'a [BrickId],
-    /// Those that are selected but show nothing; `None` if their boxes were not asked for.
+    /// Bricks that are selected but show nothing; `None` if their boxes were not asked for.
     faint: Option<Vec<BrickId>>,
 }
 
@@ -118,7 +118,7 @@ fn attributes(
     attributes
 }
 
-/// Where samples lie and what is made of them, in the words of the options.
+/// Where samples lie and how they are integrated, in the words of the options.
 fn sampling(backend: &dyn Backend, scene: &Scene, plan: &FramePlan) -> String {
     let technique = match (scene.technique, plan.proxy()) {
         (Technique::Polygons(target), _) if backend.describe().backend == BackendKind::Cpu.name() => {
