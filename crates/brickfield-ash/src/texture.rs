@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use ash::vk;
-use brickfield_core::glam::UVec3;
 use brickfield_frame::{
     AtlasShape, Chunked, HeldChunks, RenderError, Room, RoomChange, SampleFormat, Slots, TextureShape,
 };

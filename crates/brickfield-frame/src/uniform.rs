@@ -20,7 +20,7 @@ pub struct FrameUniforms {
     /// Change of the anchor a pixel to the right.
     pub anchor_right: [f32; 3],
     /// Side of a pixel in the plane at distance 1 (0: parallel rays).
-    pub pixel: f32,
+    pub pixel_side: f32,
     /// Change of the anchor a pixel down.
     pub anchor_down: [f32; 3],
     /// Distance from the eye to the plane of the anchors.
@@ -63,8 +63,8 @@ pub struct FrameUniforms {
     pub counted_from: f32,
     /// Where the first index cell begins.
     pub index_origin: [f32; 3],
-    /// Pixels along a beam's tile (1 without beams).
-    pub beam_pixels: u32,
+    /// Nothing.
+    pub padding_0: f32,
     /// Cells of the index.
     pub index_dims: [u32; 3],
     /// Number of knots.
@@ -73,24 +73,30 @@ pub struct FrameUniforms {
     pub atlas_bricks: [u32; 3],
     /// Samples along a brick's side.
     pub brick_samples: u32,
+    /// The first object-aligned planes that rays towards greater coordinates meet.
+    pub planes_low: [f32; 3],
+    /// Nothing.
+    pub padding_1: f32,
+    /// The first that rays towards smaller coordinates meet.
+    pub planes_high: [f32; 3],
+    /// Nothing.
+    pub padding_2: f32,
+    /// Distance between planes a voxel apart, in world units.
+    pub voxel_world: [f32; 3],
+    /// Nothing.
+    pub padding_3: f32,
     /// Width and height of the picture.
     pub size: [u32; 2],
     /// First row of the pass.
     pub first_row: u32,
+    /// Pixels along a beam's tile (1 without beams).
+    pub beam_pixels: u32,
     /// Pixels along a facet's side.
     pub facet_pixels: u32,
-    /// The first object-aligned planes that rays towards greater coordinates meet.
-    pub planes_low: [f32; 3],
     /// Squares of facets in a row of the picture.
     pub facet_columns: u32,
-    /// The first that rays towards smaller coordinates meet.
-    pub planes_high: [f32; 3],
     /// Nothing.
-    pub padding_0: f32,
-    /// Distance between planes a voxel apart, in world units.
-    pub voxel_world: [f32; 3],
-    /// Nothing.
-    pub padding_1: f32,
+    pub padding_4: [u32; 2],
 }
 
 /// A transfer function's knot.
@@ -137,7 +143,7 @@ impl FrameUniforms {
             anchor: float3(rays.anchor[0]),
             anchor_past_start: rays.anchor_past_start as f32,
             anchor_right: float3(rays.anchor[1]),
-            pixel: rays.pixel as f32,
+            pixel_side: rays.pixel as f32,
             anchor_down: float3(rays.anchor[2]),
             anchor_depth: rays.anchor_depth as f32,
             direction: float3(rays.direction[0]),
@@ -170,9 +176,12 @@ impl FrameUniforms {
             planes_low: float3(rays.planes.low),
             facet_columns: rays.facet_squares().x,
             planes_high: float3(rays.planes.high),
-            padding_0: 0.0,
             voxel_world: float3(rays.planes.voxel_world),
+            padding_0: 0.0,
             padding_1: 0.0,
+            padding_2: 0.0,
+            padding_3: 0.0,
+            padding_4: [0; 2],
         }
         .in_pass(&whole)
     }

@@ -266,6 +266,7 @@ impl Variant {
             ("one_node", !two_nodes),
             ("two_nodes", two_nodes),
             ("reads_field", self.reads_field()),
+            ("placed", self.field == FieldKind::Placed),
             ("wide_blocks", has(Feature::MultiLevel) || has(Feature::SkipEmpty) || self.field == FieldKind::Placed),
             ("long_rays", self.long_rays),
             ("integer_samples", self.integer_samples),

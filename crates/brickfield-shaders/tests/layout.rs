@@ -7,7 +7,11 @@ use brickfield_shaders::naga::{Module, TypeInner};
 use brickfield_shaders::{Entry, FieldKind, Variant, specialise};
 
 macro_rules! host {
-    ($t:ty, $($member:ident),*) => { (vec![$((stringify!($member), offset_of!($t, $member))),*], size_of::<$t>()) };
+    ($t:ty, $($member:ident $(= $host:ident)?),*) => {
+        (vec![$((stringify!($member), host!(@ $t, $member $($host)?))),*], size_of::<$t>())
+    };
+    (@ $t:ty, $member:ident) => { offset_of!($t, $member) };
+    (@ $t:ty, $member:ident $host:ident) => { offset_of!($t, $host) };
 }
 
 fn shader(module: &Module, name: &str) -> (Vec<(String, usize)>, usize) {
@@ -30,15 +34,71 @@ fn host_and_shader_structs_have_the_same_layout() {
     variant.field = FieldKind::Placed;
     let module = specialise(&variant).unwrap().module;
     #[rustfmt::skip]
-    assert_equal(&module, "Frame", host!(FrameUniforms, anchor, anchor_past_start, anchor_right, pixel, anchor_down,
-        anchor_depth, direction, least_parameter, direction_right, step_world, direction_down, transmittance_floor,
-        domain_min, sample_scale, domain_max, sample_offset, visible_min, cell_samples, visible_max, first_segment,
-        first_sample, end_segment, last_sample, counted_from, index_origin, beam_pixels, index_dims, n_knots,
-        atlas_bricks, brick_samples, size, first_row, facet_pixels, planes_low, facet_columns, planes_high, padding_0,
-        voxel_world, padding_1));
+    assert_equal(&module, "Frame", host!(FrameUniforms, anchor, anchor_right, anchor_down, direction, direction_right,
+        direction_down, domain_min, domain_max, visible_min, visible_max, first_sample, last_sample, index_origin,
+        index_dims, atlas_bricks, planes_low, planes_high, voxel_world, size, facets_of_picture = facet_pixels));
+    assert_rows();
     assert_equal(&module, "Knot", host!(KnotUniform, optics, value, per_value, padding));
     assert_equal(&module, "Place", host!(PlaceUniform, texel, level, first, padding, last, axes));
     for fetch in Fetch::ALL {
         assert_equal(&specialise(&Variant::probe(fetch)).unwrap().module, "Probe", host!(ProbeUniforms, work));
+    }
+}
+
+/// Numbers that share a row of the frame's uniforms are where the functions of frame.wesl look for them: `name` reads component
+/// `component` of the row `row`.
+fn assert_rows() {
+    macro_rules! offsets {
+        ($($member:ident),*) => { [$((stringify!($member), offset_of!(FrameUniforms, $member))),*] };
+    }
+    let host = offsets!(
+        anchor,
+        anchor_past_start,
+        anchor_right,
+        pixel_side,
+        anchor_down,
+        anchor_depth,
+        direction,
+        least_parameter,
+        direction_right,
+        step_world,
+        direction_down,
+        transmittance_floor,
+        domain_min,
+        sample_scale,
+        domain_max,
+        sample_offset,
+        visible_min,
+        cell_samples,
+        visible_max,
+        first_segment,
+        first_sample,
+        end_segment,
+        last_sample,
+        counted_from,
+        index_dims,
+        n_knots,
+        atlas_bricks,
+        brick_samples,
+        size,
+        first_row,
+        beam_pixels,
+        facet_pixels,
+        facet_columns
+    );
+    let offset = |name: &str| match name {
+        "facets_of_picture" => offset_of!(FrameUniforms, facet_pixels),
+        _ => host.iter().find(|(n, _)| *n == name).unwrap_or_else(|| panic!("{name}")).1,
+    };
+    let library = brickfield_shaders::ShaderLibrary::embedded();
+    let (_, text) = library.modules().find(|(name, _)| *name == "frame").unwrap();
+    let functions: Vec<&str> = text.split("\nfn ").skip(1).collect();
+    assert_eq!(functions.len(), 18);
+    for function in functions {
+        let name = function.split('(').next().unwrap();
+        let read = function.split("return frame.").nth(1).unwrap().split(';').next().unwrap();
+        let (row, component) = read.split_once('.').unwrap();
+        let place = 4 * "xyzw".find(component).unwrap();
+        assert_eq!(offset(name), offset(row) + place, "{name} is not {read}");
     }
 }

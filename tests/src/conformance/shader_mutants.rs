@@ -90,12 +90,12 @@ mutants! {
     /// Steps instead of lines between knots.
     STEPS: "steps", "transfer", "on_line", "low.optics + (high - low.optics) * f" => "low.optics";
     /// Rays pass the pixels' corners.
-    PIXEL_CORNER: "pixel-corner", "rays", "pixel_ray", "let at = pixel + 0.5 - 0.5 * vec2f(frame.size);"
-        => "let at = pixel - 0.5 * vec2f(frame.size);";
+    PIXEL_CORNER: "pixel-corner", "rays", "pixel_ray", "let at = pixel + 0.5 - 0.5 * vec2f(frame.size.xy);"
+        => "let at = pixel - 0.5 * vec2f(frame.size.xy);";
     /// Directions are not normalised.
     NOT_NORMALISED: "not-normalised", "rays", "pixel_ray", "let length = sqrt(1.0 + square);" => "let length = 1.0;";
     /// The phase of the shells is that of a plane.
-    FLAT_SHELLS: "flat-shells", "rays", "pixel_ray", "frame.anchor_depth * (square / (1.0 + length))" => "0.0";
+    FLAT_SHELLS: "flat-shells", "rays", "pixel_ray", "anchor_depth() * (square / (1.0 + length))" => "0.0";
     /// The first segment is not shortened.
     FIRST_NOT_CUT: "first-not-cut", "segments", "piece_of", "select(boundary(ray, k), walk.span.start, k == walk.first)"
         => "boundary(ray, k)";
@@ -129,13 +129,13 @@ mutants! {
     /// The light of a ray's earlier passes is forgotten.
     PASS_FORGETS: "pass-forgets", "march", "integrate_on", "before = seen_before[slot];" => "before = vec4f(0.0);";
     /// A pass begins at the ray's first segment.
-    PASS_RESTARTS: "pass-restarts", "march", "integrate_on", "walk.k = max(walk.k, frame.first_segment);" => "";
+    PASS_RESTARTS: "pass-restarts", "march", "integrate_on", "walk.k = max(walk.k, first_segment());" => "";
     /// 16-bit samples are counted from the first knot's as fractions, not as integers.
     FRACTIONS_OF_16_BITS: "fractions-of-16-bits", "texels", "load",
-        "round(textureLoad(atlas, i, 0).x * 65535.0) - frame.counted_from"
-        => "(textureLoad(atlas, i, 0).x - frame.counted_from / 65535.0) * 65535.0";
+        "round(textureLoad(atlas, i, 0).x * 65535.0) - counted_from()"
+        => "(textureLoad(atlas, i, 0).x - counted_from() / 65535.0) * 65535.0";
     /// Rays end at a transmittance of 1/5.
-    ENDS_EARLY: "ends-early", "ending", "ended", "exp(-seen.w) < frame.transmittance_floor" => "exp(-seen.w) < 0.2";
+    ENDS_EARLY: "ends-early", "ending", "ended", "exp(-seen.w) < transmittance_floor()" => "exp(-seen.w) < 0.2";
     /// Bricks have the steps of level 0, whatever their level.
     STEPS_OF_LEVEL_0: "steps-of-level-0", "segments", "in_steps_of", "own.apart *= steps_in(area);" => "";
     /// A brick's segments go on to the end of the ray.
@@ -160,7 +160,7 @@ mutants! {
     /// The axes of a texture are those of space.
     PLACED_AXES: "placed-axes", "field/placed", "value_at", "vec3f(s[area.axes.x], s[area.axes.y], s[area.axes.z])" => "s";
     /// The first sample lies at the block's corner.
-    PLACED_FIRST: "placed-first", "field/placed", "patch_of", "area.first = place.first + frame.first_sample;"
+    PLACED_FIRST: "placed-first", "field/placed", "patch_of", "area.first = place.first + frame.first_sample.xyz;"
         => "area.first = block.corner;";
     /// Slots are read as if they were of level 0.
     PLACED_SCALE: "placed-scale", "field/placed", "patch_of", "area.scale = 1.0 / f32(1u << place.level);" => "area.scale = 1.0;";

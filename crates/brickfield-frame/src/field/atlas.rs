@@ -194,7 +194,8 @@ mod tests {
         assert_eq!(first.change, RoomChange::Replace);
         let after = |n| slots(n).room(Some(first.shape), 256).unwrap();
         assert_eq!((after(9), after(2).change), (Room { change: RoomChange::Keep, ..first }, RoomChange::Keep));
-        assert_eq!((after(40).change, after(1).change), (RoomChange::Grow, RoomChange::Replace));
+        let far_too_large = slots(1).room(Some(slots(40).room(None, 256).unwrap().shape), 256).unwrap();
+        assert_eq!((after(40).change, far_too_large.change), (RoomChange::Grow, RoomChange::Replace));
         assert!(matches!(slots(9).room(None, 16), Err(RenderError::AtlasTooLarge { n_bricks: 9, .. })));
     }
 }

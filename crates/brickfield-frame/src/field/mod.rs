@@ -50,8 +50,10 @@ pub enum FieldError {
     IndexDims { index: UVec3, dims: UVec3, cell_samples: u32, expected: UVec3 },
     #[error("the index names slot {slot}, which holds no samples: there are {n_slots} slots")]
     NoSuchSlot { slot: u32, n_slots: u32 },
-    #[error("an index of cells of {cell_samples} samples for bricks of {side} samples, which have {} cells", side - 1)]
-    CellOfBricks { cell_samples: u32, side: u32 },
+    #[error(
+        "an index of cells of {cell_samples} samples from sample {origin} on for bricks of {side} samples, which have {} cells from sample 0 on", side - 1
+    )]
+    CellOfBricks { cell_samples: u32, origin: f64, side: u32 },
 }
 
 impl Field {
@@ -74,8 +76,9 @@ impl Field {
             return Err(FieldError::NoSuchSlot { slot, n_slots: slots.n_slots() });
         }
         match slots.places() {
-            Places::Even(side) if side.n_cells() != lattice.cell_samples => {
-                Err(FieldError::CellOfBricks { cell_samples: lattice.cell_samples, side: side.n_samples() })
+            Places::Even(side) if side.n_cells() != lattice.cell_samples || lattice.origin != 0.0 => {
+                let IndexLattice { cell_samples, origin } = lattice;
+                Err(FieldError::CellOfBricks { cell_samples, origin, side: side.n_samples() })
             }
             _ => Ok(Field { dims, index, slots, join }),
         }

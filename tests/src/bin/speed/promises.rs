@@ -38,7 +38,7 @@ pub(crate) fn of_skipping(
         let pair = (of("fast, no skipping"), of("fast, skipping"));
         let what = format!("{name}, {kind}: without skipping / with, fast mode");
         claims.push(ratio(what, pair, Bound::AtLeast(volume.skipping_gains)));
-        let empty_ms = of("nothing to see").map_or(f64::NAN, |ms| median(ms.to_vec()));
+        let empty_ms = of(crate::volumes::NOTHING_TO_SEE).map_or(f64::NAN, |ms| median(ms.to_vec()));
         let what = format!("{name}, {kind}: 20 ms / a frame with nothing to see");
         claims.push(Claim::of(what, 20.0 / empty_ms.max(1e-3), Bound::AtLeast(1.0)));
         claims.push(equal_images(name, backend.as_mut(), [&with, &without], &reference)?);

@@ -11,6 +11,9 @@ use brickfield_core::{BrickSide, TransferFunction, Volume};
 
 use crate::{Arguments, Backends};
 
+/// The contestant whose transfer function shows nothing.
+pub(crate) const NOTHING_TO_SEE: &str = "nothing to see";
+
 /// Name, path below the data folder, and how many times as fast skipping must be in fast mode.
 const VOLUMES: [(&str, &str, f64); 2] = [("engine", "ct/engine.vti", 2.0), ("aneurism", "ct/aneurism.vti", 4.0)];
 
@@ -99,7 +102,7 @@ impl TimedVolume {
             ("fast, no skipping", with(Mode::FAST, Skipping::Off)?),
             ("exact, skipping", with(Mode::Exact, Skipping::On)?),
             ("exact, no skipping", with(Mode::Exact, Skipping::Off)?),
-            ("nothing to see", Scene { transfer: invisible, ..with(Mode::FAST, Skipping::On)? }),
+            (NOTHING_TO_SEE, Scene { transfer: invisible, ..with(Mode::FAST, Skipping::On)? }),
         ];
         let named = |(what, scene)| (format!("{}, {what}", self.name), self.middle(), scene);
         Ok(scenes.map(named).into())
