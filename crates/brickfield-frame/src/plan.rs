@@ -244,7 +244,8 @@ fn check(parts: &PlanParts) -> Result<(), PlanError> {
     let Aabb { min, max } = parts.domain;
     // NaN fails too; an empty domain may lie anywhere.
     let is_inside = min.cmpge(volume.min).all() && max.cmple(volume.max).all();
-    if !is_inside && !(parts.domain.is_empty() && min.is_finite() && max.is_finite()) {
+    let is_nothing = parts.domain.is_empty() && min.is_finite() && max.is_finite();
+    if !(is_inside || is_nothing) {
         return Err(PlanError::Domain { domain: parts.domain, volume });
     }
     if !parts.dark.is_of(field) {

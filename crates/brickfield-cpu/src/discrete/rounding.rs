@@ -111,7 +111,7 @@ fn values(field: &impl FieldReader, part: CutSegment, q: DVec3, stray: impl Fn(f
     };
     let stride = f64::from(field.plan().field().level_at(cell).stride());
     let (min, max) = at.range();
-    candidates(&field.plan().transfer(), value, stray(field.gain() * (max - min), stride))
+    candidates(field.plan().transfer(), value, stray(field.gain() * (max - min), stride))
 }
 
 /// The values at which extinction and colour are extreme: the node's own first, the ends, and both sides of knots between.

@@ -122,7 +122,7 @@ impl ProxyGeometry {
         geometry
     }
 
-    /// The same polygons in batches of at most `n_triangles` (at least 1): the picture is the same. Those of [`of`](Self::of) are
+    /// The same polygons in batches of at most `n_triangles` (at least 1): the picture is the same. Those of a new plan are
     /// so large that only large pictures have several.
     #[must_use]
     pub fn in_batches_of(mut self, n_triangles: u32) -> ProxyGeometry {
