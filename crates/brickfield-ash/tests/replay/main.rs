@@ -5,7 +5,6 @@ mod pictures;
 mod plans;
 mod probe;
 mod refusals;
-mod reuse;
 mod validation;
 
 use brickfield_ash::{AshBackend, ConnectError, Options, Validation};

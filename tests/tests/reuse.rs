@@ -1,18 +1,67 @@
-//! What frames share stays on the device, and nothing that is old is drawn. Prints `no device` where there is none.
-
-mod support;
+//! Data that frames share stays on the device, and no old data is drawn, on either GPU backend. Prints `no device` where there is none.
 
 use std::sync::Arc;
 
-use brickfield_core::glam::{DVec3, UVec2, UVec3};
-use brickfield_core::{BrickSide, Camera, Grid, Knot, Projection, TransferFunction};
-use brickfield_frame::{
+use brickfield::core::glam::{DVec3, UVec2, UVec3};
+use brickfield::core::{BrickSide, Camera, Grid, Knot, Projection, TransferFunction};
+use brickfield::frame::{
     Backend, Chunk, DarkRegions, Decode, Drawing, Evaluate, Feature, Field, Frame, FramePlan, IndexEntry, IndexGrid,
     IndexLattice, Join, MacrocellRanges, Mode, Occupancy, Places, PlanParts, QuadratureRule, RayFrame, Reach,
     SampleFormat, Sampling, ShaderFunction, Slots, Steps,
 };
-use brickfield_wgpu::WgpuBackend;
-use support::backend;
+use brickfield_ash::{AshBackend, ConnectError, Options, Validation};
+use brickfield_wgpu::{AdapterChoice, OpenError, WgpuBackend};
+
+/// A backend on this machine's default device.
+trait Open: Backend + Evaluate + Sized {
+    /// `None` without a device.
+    fn open() -> Option<Self>;
+}
+
+impl Open for WgpuBackend {
+    fn open() -> Option<WgpuBackend> {
+        match WgpuBackend::new(&AdapterChoice::Default) {
+            Err(e @ OpenError::NoAdapter) => no_device(&e),
+            opened => Some(opened.unwrap()),
+        }
+    }
+}
+
+impl Open for AshBackend {
+    fn open() -> Option<AshBackend> {
+        connect(&Options { validation: Validation::Off, ..Options::default() })
+    }
+}
+
+fn connect(options: &Options) -> Option<AshBackend> {
+    match AshBackend::new(options) {
+        Err(e @ (ConnectError::NoLoader { .. } | ConnectError::NoDevice | ConnectError::NoValidationLayer)) => {
+            no_device(&e)
+        }
+        connected => Some(connected.unwrap()),
+    }
+}
+
+fn no_device<B>(why: &dyn std::error::Error) -> Option<B> {
+    println!("no device: {why}");
+    None
+}
+
+/// Each test on each backend.
+macro_rules! on_both_backends {
+    ($($test:ident)*) => {
+        mod wgpu { $(#[test] fn $test() { super::$test::<super::WgpuBackend>(); })* }
+        mod ash { $(#[test] fn $test() { super::$test::<super::AshBackend>(); })* }
+    };
+}
+
+on_both_backends! {
+    one_brick_in_anothers_place_is_brought_alone
+    an_atlas_that_grows_keeps_its_bricks
+    leaps_are_over_the_dark_of_the_bricks_that_are_there
+    bricks_that_were_not_drawn_for_a_while_are_still_themselves
+    an_unchanged_plan_brings_its_numbers_only
+}
 
 const SIDE: BrickSide = BrickSide::S16;
 const FORMAT: SampleFormat = SampleFormat::Float32;
@@ -103,7 +152,7 @@ fn leaping(bricks: &[Option<Brick>]) -> FramePlan {
 
 /// The frame of a plan of some bricks, which is a fresh backend's, and in which each brick lies where it belongs.
 #[track_caller]
-fn frame(backend: &mut WgpuBackend, plan: &FramePlan, bricks: &[Option<Brick>]) -> Frame {
+fn frame<B: Open>(backend: &mut B, plan: &FramePlan, bricks: &[Option<Brick>]) -> Frame {
     let frame = backend.render(plan).unwrap();
     let local = UVec3::new(7, 4, 11);
     let at = |slot: u32| (cell(slot) * SIDE.n_cells() + local).as_vec3().extend(0.0).to_array();
@@ -115,14 +164,13 @@ fn frame(backend: &mut WgpuBackend, plan: &FramePlan, bricks: &[Option<Brick>]) 
         let [expected, resident] = brick.as_ref().map_or([0.0; 2], |brick| [stored(brick), 1.0]);
         assert!((found[0] - expected).abs() < 1e-5 && found[1] == resident, "slot {slot}: {found:?}, not {expected}");
     }
-    let fresh = support::backend().unwrap().render(plan).unwrap();
+    let fresh = B::open().unwrap().render(plan).unwrap();
     assert!(frame.image == fresh.image, "a fresh backend has another picture");
     frame
 }
 
-#[test]
-fn one_brick_in_anothers_place_is_brought_alone() {
-    let Some(mut backend) = backend() else { return };
+fn one_brick_in_anothers_place_is_brought_alone<B: Open>() {
+    let Some(mut backend) = B::open() else { return };
     let mut bricks = bricks(0..N_BRICKS);
     let mut before = frame(&mut backend, &plan(&bricks), &bricks);
     assert!(before.uploaded_bytes >= u64::from(N_BRICKS) * BRICK_BYTES);
@@ -136,16 +184,14 @@ fn one_brick_in_anothers_place_is_brought_alone() {
     }
 }
 
-#[test]
-fn an_atlas_that_grows_keeps_its_bricks() {
-    let Some(mut backend) = backend() else { return };
+fn an_atlas_that_grows_keeps_its_bricks<B: Open>() {
+    let Some(mut backend) = B::open() else { return };
     grow(&mut backend, plan);
 }
 
 /// So do the lists of macrocells' distances; and to leap changes nothing.
-#[test]
-fn leaps_are_over_the_dark_of_the_bricks_that_are_there() {
-    let Some(mut backend) = backend() else { return };
+fn leaps_are_over_the_dark_of_the_bricks_that_are_there<B: Open>() {
+    let Some(mut backend) = B::open() else { return };
     grow(&mut backend, leaping);
     let mut bricks = bricks(0..N_BRICKS);
     for (slot, tone) in [(0, 10), (4, 11), (8, 12)] {
@@ -160,7 +206,7 @@ fn leaps_are_over_the_dark_of_the_bricks_that_are_there() {
     }
 }
 
-fn grow(backend: &mut WgpuBackend, plan: fn(&[Option<Brick>]) -> FramePlan) {
+fn grow<B: Open>(backend: &mut B, plan: fn(&[Option<Brick>]) -> FramePlan) {
     let bricks = bricks(0..N_BRICKS);
     let mut n_held = 0;
     for n in [2, 3, 9, 2, 9] {
@@ -173,9 +219,8 @@ fn grow(backend: &mut WgpuBackend, plan: fn(&[Option<Brick>]) -> FramePlan) {
 }
 
 /// What a device is thought to hold must still be there, whatever was brought for frames in between.
-#[test]
-fn bricks_that_were_not_drawn_for_a_while_are_still_themselves() {
-    let Some(mut backend) = backend() else { return };
+fn bricks_that_were_not_drawn_for_a_while_are_still_themselves<B: Open>() {
+    let Some(mut backend) = B::open() else { return };
     let (old, new) = (bricks(0..4), bricks(4..8));
     // All slots but one are filled anew, and the one comes back: the last, while there are fewer slots, and one among others.
     for (left_out, n_slots) in [(3, 3), (1, 4)] {
@@ -188,9 +233,8 @@ fn bricks_that_were_not_drawn_for_a_while_are_still_themselves() {
     }
 }
 
-#[test]
-fn an_unchanged_plan_brings_its_numbers_only() {
-    let Some(mut backend) = backend() else { return };
+fn an_unchanged_plan_brings_its_numbers_only<B: Open>() {
+    let Some(mut backend) = B::open() else { return };
     let plan = plan(&bricks(0..N_BRICKS));
     let first = backend.render(&plan).unwrap();
     assert!(first.uploaded_bytes >= u64::from(N_BRICKS) * BRICK_BYTES);
@@ -199,4 +243,12 @@ fn an_unchanged_plan_brings_its_numbers_only() {
         assert!(again.image == first.image);
         assert!((1..4 << 10).contains(&again.uploaded_bytes), "{} bytes", again.uploaded_bytes);
     }
+}
+
+#[test]
+fn the_layer_is_silent_while_an_atlas_grows_brick_by_brick() {
+    let options = Options { validation: Validation::On, copy_bytes: BRICK_BYTES as usize, ..Options::default() };
+    let Some(mut backend) = connect(&options) else { return };
+    grow(&mut backend, leaping);
+    assert_eq!(backend.validation_messages(), Vec::<String>::new());
 }
