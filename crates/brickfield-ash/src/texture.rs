@@ -22,7 +22,7 @@ pub(crate) struct Texture {
 const ALIGNMENT: usize = 16;
 
 impl Texture {
-    /// A texture with room for slots: the old one, or one to which its contents are copied, or an empty one.
+    /// A texture with room for slots: the old texture, a larger texture with the old contents, or an empty texture.
     pub(crate) fn with_room(
         device: &Arc<Device>,
         queue: &mut Queue,

@@ -5,7 +5,7 @@ use std::fmt;
 /// The kind of an adapter.
 ///
 /// The order is the order of preference, the same for every backend: without another wish a backend opens the first adapter of
-/// the least kind. An adapter of an unknown kind comes before one in software, which is never the faster one.
+/// the least kind. An adapter of an unknown kind comes before a software adapter, which is never the faster.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum AdapterKind {
     /// A graphics card.

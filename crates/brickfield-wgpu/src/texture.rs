@@ -46,7 +46,7 @@ impl Texture {
         self.shape.atlas()
     }
 
-    /// A texture with room for slots: the old one, or one to which its contents are copied, or an empty one.
+    /// A texture with room for slots: the old texture, a larger texture with the old contents, or an empty texture.
     fn with_room(device: &Device, slots: &Slots, old: Option<Texture>) -> Result<Texture, RenderError> {
         let limit = device.description.capabilities.max_texture_3d;
         let old = old.filter(|old| old.format == slots.format());

@@ -110,7 +110,7 @@ pub struct FunctionPoint {
     pub tolerance: [f64; 4],
 }
 
-/// The plans of a picture case: one that backends replay, and one of which the reference is made.
+/// The plans of a picture case: the plan that backends replay, and the plan that the reference is made of.
 pub struct Plans {
     /// The plan that backends replay.
     pub replayed: FramePlan,
