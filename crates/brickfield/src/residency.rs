@@ -16,8 +16,8 @@ use crate::Scene;
 
 /// The bricks of the last frame, in their slots, and the ranges and distances of their macrocells.
 ///
-/// A frame that needs another brick copies that brick alone; a scene that is drawn again costs nothing. One residency serves one tree at a
-/// time: handed another, it begins anew.
+/// A frame that needs another brick copies that brick alone; a scene that is drawn again costs nothing.
+/// One residency serves one tree at a time: handed another, it begins anew.
 #[derive(Debug, Default)]
 pub struct Residency {
     tree: Option<TreeId>,
