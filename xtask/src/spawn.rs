@@ -17,6 +17,7 @@ pub(crate) enum Tool {
     Conformance,
     Gpu,
     Orders,
+    Sheet,
     Speed,
 }
 
@@ -88,6 +89,7 @@ impl Tool {
             Tool::Conformance => "conformance",
             Tool::Gpu => "gpu",
             Tool::Orders => "orders",
+            Tool::Sheet => "sheet",
             Tool::Speed => "speed",
         }
     }

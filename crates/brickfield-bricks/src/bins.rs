@@ -1,6 +1,6 @@
 //! Value histograms: the bins and their law.
 
-use brickfield_core::{ScalarType, ValueRange};
+use brickfield_core::{Rescale, ScalarType, ValueRange};
 
 /// Bins of a histogram.
 pub const N_BINS: usize = 32;
@@ -69,32 +69,39 @@ impl Bins {
     }
 }
 
-/// The bins, and a table of the bin of every value of an 8- or 16-bit type.
+/// The bins of stored samples, and a table for every sample of an 8- or 16-bit type.
 pub(crate) struct BinTable {
-    pub(crate) bins: Bins,
+    bins: Bins,
+    rescale: Rescale,
     table: Box<[u8; 1 << 16]>,
 }
 
 impl BinTable {
-    pub(crate) fn new(bins: Bins, scalar: ScalarType) -> BinTable {
+    pub(crate) fn new(bins: Bins, scalar: ScalarType, rescale: Rescale) -> BinTable {
         let mut table = Box::new([0; 1 << 16]);
         let n_values = 1usize << (8 * scalar.n_bytes().min(4));
         if n_values <= table.len() {
             for (pattern, bin) in table[..n_values].iter_mut().enumerate() {
-                *bin = bins.of(value_of_pattern(pattern as u16, scalar)) as u8;
+                *bin = bins.of(rescale.value(number_of_pattern(pattern as u16, scalar))) as u8;
             }
         }
-        BinTable { bins, table }
+        BinTable { bins, rescale, table }
     }
 
-    /// The bin of the value with these bits, for 8- and 16-bit types.
+    /// The bin of a stored number.
+    #[inline]
+    pub(crate) fn of(&self, stored: f64) -> usize {
+        self.bins.of(self.rescale.value(stored))
+    }
+
+    /// The bin of the sample with these bits, for 8- and 16-bit types.
     #[inline]
     pub(crate) fn at(&self, pattern: u16) -> usize {
         usize::from(self.table[usize::from(pattern)])
     }
 }
 
-fn value_of_pattern(pattern: u16, scalar: ScalarType) -> f64 {
+fn number_of_pattern(pattern: u16, scalar: ScalarType) -> f64 {
     match scalar {
         ScalarType::I8 => f64::from(pattern as u8 as i8),
         ScalarType::I16 => f64::from(pattern as i16),

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use brickfield_core::{BrickId, BrickLayout, BrickSide, Level, Volume, with_voxels};
+use brickfield_core::{BrickId, BrickLayout, BrickSide, Level, Rescale, Volume, with_voxels};
 use rayon::prelude::*;
 
 use crate::bins::{BinTable, Histogram};
@@ -75,11 +75,12 @@ pub fn build_tree_observed(
     let bins = Bins::new(volume.range());
     let n_done = AtomicUsize::new(0);
     let brick_done = || observe(Progress { n_done: n_done.fetch_add(1, Ordering::Relaxed) + 1, n_total });
-    let job = Job { layout, downsampling: options.downsampling, bins, brick_done: &brick_done };
+    let rescale = volume.rescale();
+    let job = Job { layout, downsampling: options.downsampling, bins, rescale, brick_done: &brick_done };
     let levels = with_voxels!(volume.voxels(), v => build_levels(v, &job))?;
     let (grid, scalar) = (*volume.grid(), volume.scalar_type());
     let id = TreeId::new();
-    Ok(BrickTree { id, layout, grid, downsampling: options.downsampling, bins, scalar, levels })
+    Ok(BrickTree { id, layout, grid, downsampling: options.downsampling, bins, scalar, rescale, levels })
 }
 
 /// The layout and options that all levels are built with.
@@ -87,6 +88,7 @@ struct Job<'a> {
     layout: BrickLayout,
     downsampling: Downsampling,
     bins: Bins,
+    rescale: Rescale,
     brick_done: &'a (dyn Fn() + Sync),
 }
 
@@ -121,9 +123,9 @@ fn build_levels<T: BrickScalar>(voxels: &[T], job: &Job<'_>) -> Result<Vec<TreeL
 }
 
 fn finest_level<T: BrickScalar>(source: Dense<'_, T>, job: &Job<'_>) -> Result<TreeLevel, BuildError> {
-    let table = BinTable::new(job.bins, T::TYPE);
+    let table = BinTable::new(job.bins, T::TYPE, job.rescale);
     fill_level(source, Level(0), job, |id, samples| BrickSummary {
-        range: range_of(samples),
+        range: job.rescale.values(range_of(samples)),
         histogram: owned_histogram(samples, &job.layout, id, &table),
     })
 }
@@ -135,7 +137,8 @@ fn coarse_level<T: BrickScalar>(
     job: &Job<'_>,
 ) -> Result<TreeLevel, BuildError> {
     fill_level(source, level, job, |id, samples| {
-        let mut summary = BrickSummary { range: range_of(samples), histogram: Histogram::default() };
+        let mut summary =
+            BrickSummary { range: job.rescale.values(range_of(samples)), histogram: Histogram::default() };
         for child in job.layout.children(id).map(|child| &below[job.layout.ordinal(child)]) {
             summary.range = summary.range.union(child.range);
             summary.histogram.add(&child.histogram);

@@ -115,8 +115,8 @@ sample! {
     i8 I8 i16 i16::from, |s| (s + 32) >> 6, |v, t: &BinTable| t.at(u16::from(v as u8));
     u16 U16 u32 u32::from, |s| (s + 32) >> 6, |v, t: &BinTable| t.at(v);
     i16 I16 i32 i32::from, |s| (s + 32) >> 6, |v, t: &BinTable| t.at(v as u16);
-    u32 U32 u64 u64::from, |s| (s + 32) >> 6, |v, t: &BinTable| t.bins.of(f64::from(v));
-    i32 I32 i64 i64::from, |s| (s + 32) >> 6, |v, t: &BinTable| t.bins.of(f64::from(v));
-    f32 F32 f64 f64::from, |s: f64| s / 64.0, |v, t: &BinTable| t.bins.of(f64::from(v));
-    f64 F64 f64 |v| v / 64.0, |s: f64| s, |v, t: &BinTable| t.bins.of(v);
+    u32 U32 u64 u64::from, |s| (s + 32) >> 6, |v, t: &BinTable| t.of(f64::from(v));
+    i32 I32 i64 i64::from, |s| (s + 32) >> 6, |v, t: &BinTable| t.of(f64::from(v));
+    f32 F32 f64 f64::from, |s: f64| s / 64.0, |v, t: &BinTable| t.of(f64::from(v));
+    f64 F64 f64 |v| v / 64.0, |s: f64| s, |v, t: &BinTable| t.of(v);
 }

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use brickfield_core::{BrickId, BrickLayout, Grid, Level, ScalarType, ValueRange, Voxels, with_voxels};
+use brickfield_core::{BrickId, BrickLayout, Grid, Level, Rescale, ScalarType, ValueRange, Voxels, with_voxels};
 
 use crate::sample::BrickScalar;
 use crate::{Bins, BrickSamples, Downsampling, Histogram, TreeMemory, tree_memory};
@@ -19,6 +19,7 @@ pub struct BrickTree {
     pub(crate) downsampling: Downsampling,
     pub(crate) bins: Bins,
     pub(crate) scalar: ScalarType,
+    pub(crate) rescale: Rescale,
     pub(crate) levels: Vec<TreeLevel>,
 }
 
@@ -37,7 +38,7 @@ impl TreeId {
 /// Trees are equal if their samples are.
 impl PartialEq for BrickTree {
     fn eq(&self, other: &BrickTree) -> bool {
-        let of = |t: &BrickTree| (t.layout, t.grid, t.downsampling, t.bins, t.scalar);
+        let of = |t: &BrickTree| (t.layout, t.grid, t.downsampling, t.bins, t.scalar, t.rescale);
         self.id == other.id || (of(self) == of(other) && self.levels == other.levels)
     }
 }
@@ -80,6 +81,11 @@ impl BrickTree {
         self.scalar
     }
 
+    /// The map from stored samples to data values: the volume's.
+    pub fn rescale(&self) -> Rescale {
+        self.rescale
+    }
+
     /// How each level was computed from the one below.
     pub fn downsampling(&self) -> Downsampling {
         self.downsampling
@@ -95,7 +101,7 @@ impl BrickTree {
         self.layout.side().n_samples_total() * self.scalar.n_bytes()
     }
 
-    /// The samples of a brick.
+    /// The samples of a brick as they are stored.
     ///
     /// # Panics
     /// If the layout has no such brick.

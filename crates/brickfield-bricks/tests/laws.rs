@@ -2,7 +2,7 @@
 
 use brickfield_bricks::{Bins, BrickTree, BuildOptions, Downsampling, Histogram, N_BINS, build_tree};
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{BrickId, BrickLayout, BrickSide, Grid, Level, ScalarType, ValueRange, Volume, Voxels};
+use brickfield_core::{BrickId, BrickLayout, BrickSide, Grid, Level, Rescale, ScalarType, ValueRange, Volume, Voxels};
 use proptest::prelude::*;
 
 const BOTH: [Downsampling; 2] = [Downsampling::Subsample, Downsampling::Average];
@@ -135,7 +135,10 @@ fn check_ranges(tree: &BrickTree) {
     let layout = tree.layout();
     for id in all_bricks(*layout) {
         let samples = tree.samples(id);
-        let own = (0..samples.len()).map(|i| samples.at(i)).map(|v| ValueRange { min: v, max: v });
+        let own = (0..samples.len())
+            .map(|i| samples.at(i))
+            .map(|v| ValueRange { min: v, max: v })
+            .map(|v| tree.rescale().values(v));
         let below = layout.children(id).map(|child| tree.summary(child).range);
         assert_eq!(tree.summary(id).range, own.chain(below).reduce(ValueRange::union).unwrap(), "{id}");
     }
@@ -149,7 +152,7 @@ fn check_histograms(volume: &Volume, tree: &BrickTree) {
         let mut expected = vec![Histogram::default(); layout.n_bricks_total(level)];
         for p in points(dims) {
             let coords = (p / (layout.side().n_cells() * level.stride())).min(layout.n_bricks(level) - 1);
-            let bin = bins.of(volume.voxels().at(index(dims, p)));
+            let bin = bins.of(volume.value(index(dims, p)));
             expected[layout.ordinal(BrickId { level, coords })].counts[bin] += 1;
         }
         for (id, expected) in layout.bricks(level).zip(expected) {
@@ -198,6 +201,21 @@ fn the_laws_hold_where_bricks_begin_and_end() {
 fn the_laws_hold_for_every_scalar_type() {
     for (seed, scalar) in ScalarType::ALL.into_iter().enumerate() {
         check_all(&noise(UVec3::new(37, 20, 18), scalar, seed as u64), BrickSide::S16);
+    }
+}
+
+#[test]
+fn the_laws_hold_for_stored_numbers_of_other_values() {
+    for (scalar, slope, intercept) in
+        [(ScalarType::U8, -0.3, 7.0), (ScalarType::I16, 2.5, -1024.0), (ScalarType::F32, -1e6, 0.1)]
+    {
+        let stored = noise(UVec3::new(37, 20, 18), scalar, 9);
+        let rescale = Rescale::new(slope, intercept).unwrap();
+        let volume = Volume::rescaled(*stored.grid(), stored.voxels().clone(), rescale).unwrap();
+        check_all(&volume, BrickSide::S16);
+        let tree = tree(&volume, BrickSide::S16, Downsampling::Subsample);
+        assert_eq!(tree.summary(tree.layout().root()).range, volume.range());
+        assert_ne!(tree, self::tree(&stored, BrickSide::S16, Downsampling::Subsample));
     }
 }
 

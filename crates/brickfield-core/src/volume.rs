@@ -1,14 +1,15 @@
 //! A scalar volume.
 
-use crate::{Grid, Scalar, ScalarType, Voxels, with_voxels};
+use crate::{Grid, Rescale, Scalar, ScalarType, Voxels, with_voxels};
 
-/// A scalar volume: voxels in their native type, and where they lie.
+/// A scalar volume: voxels in the type that they are stored in, their data values, and where they lie.
 ///
 /// All values are finite: [`Volume::new`] replaces values that are not, and counts them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volume {
     grid: Grid,
     voxels: Voxels,
+    rescale: Rescale,
     range: ValueRange,
     non_finite: NonFinite,
 }
@@ -49,13 +50,15 @@ impl NonFinite {
     }
 }
 
-/// Voxels that do not fill the grid.
+/// Why voxels are no volume.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{n_voxels} voxels do not fill a grid of {} x {} x {}", dims.x, dims.y, dims.z)]
+#[non_exhaustive]
 #[allow(missing_docs)]
-pub struct VolumeError {
-    pub dims: glam::UVec3,
-    pub n_voxels: usize,
+pub enum VolumeError {
+    #[error("{n_voxels} voxels do not fill a grid of {} x {} x {}", dims.x, dims.y, dims.z)]
+    Unfilled { dims: glam::UVec3, n_voxels: usize },
+    #[error("values rescaled by slope {} and intercept {} reach from {} to {}; they must be finite", rescale.slope(), rescale.intercept(), range.min, range.max)]
+    BeyondFinite { rescale: Rescale, range: ValueRange },
 }
 
 impl Volume {
@@ -67,9 +70,17 @@ impl Volume {
     /// # Errors
     /// If the voxels do not fill the grid.
     pub fn new(grid: Grid, voxels: impl Into<Voxels>) -> Result<Volume, VolumeError> {
+        Volume::rescaled(grid, voxels, Rescale::IDENTITY)
+    }
+
+    /// A volume whose voxels stand for other values: they stay as they are stored.
+    ///
+    /// # Errors
+    /// If the voxels do not fill the grid, or a value is not finite once it is rescaled.
+    pub fn rescaled(grid: Grid, voxels: impl Into<Voxels>, rescale: Rescale) -> Result<Volume, VolumeError> {
         let mut voxels = voxels.into();
         if voxels.len() != grid.n_voxels() {
-            return Err(VolumeError { dims: grid.dims(), n_voxels: voxels.len() });
+            return Err(VolumeError::Unfilled { dims: grid.dims(), n_voxels: voxels.len() });
         }
         let range = with_voxels!(&voxels, v => finite_range(v));
         let non_finite = match &mut voxels {
@@ -77,7 +88,11 @@ impl Volume {
             Voxels::F64(v) => replace_non_finite(v, range),
             _ => NonFinite::default(),
         };
-        Ok(Volume { grid, voxels, range, non_finite })
+        let range = rescale.values(range);
+        if !(range.min.is_finite() && range.max.is_finite()) {
+            return Err(VolumeError::BeyondFinite { rescale, range });
+        }
+        Ok(Volume { grid, voxels, rescale, range, non_finite })
     }
 
     /// Where the voxels lie.
@@ -85,17 +100,31 @@ impl Volume {
         &self.grid
     }
 
-    /// The voxels, x fastest.
+    /// The voxels as they are stored, x fastest: [`rescale`](Self::rescale) has their values.
     pub fn voxels(&self) -> &Voxels {
         &self.voxels
     }
 
-    /// The native scalar type.
+    /// The map from stored voxels to values.
+    pub fn rescale(&self) -> Rescale {
+        self.rescale
+    }
+
+    /// The value of voxel `i`.
+    ///
+    /// # Panics
+    /// If `i` is not below the number of voxels.
+    #[inline]
+    pub fn value(&self, i: usize) -> f64 {
+        self.rescale.value(self.voxels.at(i))
+    }
+
+    /// The scalar type that voxels are stored in.
     pub fn scalar_type(&self) -> ScalarType {
         self.voxels.scalar_type()
     }
 
-    /// Least and greatest value.
+    /// Least and greatest value, rescaled.
     pub fn range(&self) -> ValueRange {
         self.range
     }
@@ -144,6 +173,19 @@ mod tests {
         assert_eq!(volume.voxels(), &Voxels::F32(vec![-2.0, -2.0, 3.0, 3.0, -2.0]));
         assert_eq!(volume.non_finite(), NonFinite { n_nan: 1, n_positive_infinity: 1, n_negative_infinity: 1 });
         assert_eq!(volume.range(), ValueRange { min: -2.0, max: 3.0 });
+    }
+
+    #[test]
+    fn stored_voxels_stand_for_other_values() {
+        let grid = Grid::axis_aligned(UVec3::new(3, 1, 1), DVec3::ONE).unwrap();
+        let volume = Volume::rescaled(grid, vec![0u8, 100, 255], Rescale::new(0.5, -1000.0).unwrap()).unwrap();
+        assert_eq!((volume.value(1), volume.range()), (-950.0, ValueRange { min: -1000.0, max: -872.5 }));
+        assert_eq!(volume.voxels(), &Voxels::U8(vec![0, 100, 255]));
+        let beyond = Volume::rescaled(grid, vec![0u8, 1, 255], Rescale::new(1e307, 0.0).unwrap()).unwrap_err();
+        assert_eq!(
+            beyond.to_string(),
+            format!("values rescaled by slope {0} and intercept 0 reach from 0 to inf; they must be finite", 1e307)
+        );
     }
 
     #[test]

@@ -35,7 +35,7 @@ pub enum ReadError {
     Empty,
     #[error("no known volume format; it starts with {found}")]
     UnknownFormat { found: Shown },
-    #[error("no DICOM slices and no OME-Zarr metadata among the {} of this folder", counted(*n_entries, "entry", "entries"))]
+    #[error("no DICOM slices, no OME-Zarr metadata and no pictures among the {} of this folder", counted(*n_entries, "entry", "entries"))]
     UnknownFolder { n_entries: usize },
     #[error("not {format}: {what} is {found}, expected {expected}")]
     WrongMagic { format: Format, what: &'static str, found: Shown, expected: &'static str },
@@ -149,7 +149,14 @@ impl ReadError {
         ReadError::WrongMagic { format, what, found: Shown::of_bytes(head), expected }
     }
 
-    #[cfg(any(feature = "vti", feature = "nifti", feature = "dicom", feature = "ome-zarr", feature = "tiff"))]
+    #[cfg(any(
+        feature = "vti",
+        feature = "nifti",
+        feature = "dicom",
+        feature = "ome-zarr",
+        feature = "tiff",
+        feature = "png"
+    ))]
     pub(crate) fn decoder(what: impl fmt::Display, source: impl Into<Box<dyn Error + Send + Sync>>) -> ReadError {
         ReadError::Decoder { what: one_line(&what.to_string()), source: source.into() }
     }

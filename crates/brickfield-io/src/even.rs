@@ -45,7 +45,7 @@ fn resampled(volume: &Volume, positions: &[f64], limits: &Limits) -> Option<(Vol
     let grid = even_grid(volume.grid(), shape.dims, step)?;
     let (min_step, max_step) = (steps[0], steps[steps.len() - 1]);
     let note = Note::EvenSlices { n_slices, min_step, max_step, n_even: n_even as usize, step };
-    Some((Volume::new(grid, voxels).ok()?, note))
+    Some((Volume::rescaled(grid, voxels, volume.rescale()).ok()?, note))
 }
 
 /// The steps between positions, the least first; `None` if the positions do not ascend from 0.
@@ -102,6 +102,7 @@ mod tests {
             frame: WorldFrame::Lps,
             unit: None,
             notes: vec![Note::GantryTilt { degrees: 1.0 }, note],
+            choices: vec![],
         }
     }
 

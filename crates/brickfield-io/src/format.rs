@@ -17,12 +17,13 @@ pub enum Format {
     Dicom,
     OmeZarr,
     Tiff,
+    Pictures,
     Raw,
 }
 
 impl Format {
     /// All formats.
-    pub const ALL: [Format; 8] = [
+    pub const ALL: [Format; 9] = [
         Format::Nrrd,
         Format::MetaImage,
         Format::Nifti,
@@ -30,6 +31,7 @@ impl Format {
         Format::Dicom,
         Format::OmeZarr,
         Format::Tiff,
+        Format::Pictures,
         Format::Raw,
     ];
 
@@ -43,6 +45,7 @@ impl Format {
             Format::Dicom => "DICOM",
             Format::OmeZarr => "OME-Zarr",
             Format::Tiff => "TIFF",
+            Format::Pictures => "folder of pictures",
             Format::Raw => "raw",
         }
     }
@@ -57,6 +60,7 @@ impl Format {
             Format::Dicom => &["dcm", "dicom", "ima"],
             Format::OmeZarr => &["zarr"],
             Format::Tiff => &["tif", "tiff"],
+            Format::Pictures => &[],
             Format::Raw => &["raw", "bin"],
         }
     }
@@ -70,6 +74,7 @@ impl Format {
             Format::Dicom => cfg!(feature = "dicom"),
             Format::OmeZarr => cfg!(feature = "ome-zarr"),
             Format::Tiff => cfg!(feature = "tiff"),
+            Format::Pictures => cfg!(any(feature = "tiff", feature = "png")),
             Format::Raw => false,
         }
     }
@@ -97,6 +102,8 @@ impl Format {
             Some(Format::Vti)
         } else if metaimage::has_magic(head) {
             Some(Format::MetaImage)
+        } else if begins_with_dicom_elements(head) {
+            Some(Format::Dicom)
         } else {
             None
         }
@@ -114,6 +121,17 @@ fn is_nifti(head: &[u8]) -> bool {
     let magic = head.get(344..348);
     let size = head.first_chunk::<4>().map(|b| (u32::from_le_bytes(*b), u32::from_be_bytes(*b)));
     matches!(magic, Some(b"n+1\0" | b"ni1\0")) || matches!(size, Some((348 | 540, _) | (_, 348 | 540)))
+}
+
+/// A DICOM file without preamble has no magic, but its first elements are telling.
+fn begins_with_dicom_elements(head: &[u8]) -> bool {
+    #[cfg(feature = "dicom")]
+    return crate::dicom::begins_with_elements(head);
+    #[cfg(not(feature = "dicom"))]
+    {
+        let _ = head;
+        false
+    }
 }
 
 pub(crate) fn is_tiff(head: &[u8]) -> bool {

@@ -1,5 +1,7 @@
 #![doc = include_str!("../README.md")]
 
+mod choice;
+mod colour;
 #[cfg(feature = "gzip")]
 mod deflate;
 mod detached;
@@ -9,9 +11,12 @@ mod error;
 mod even;
 mod file_list;
 mod files;
+mod folder;
 mod format;
-#[cfg(any(feature = "dicom", feature = "ome-zarr", feature = "tiff"))]
+#[cfg(any(feature = "dicom", feature = "ome-zarr", feature = "tiff", feature = "png"))]
 mod guard;
+#[cfg(any(feature = "ome-zarr", feature = "tiff"))]
+mod length_unit;
 mod limits;
 mod lines;
 pub mod metaimage;
@@ -23,6 +28,9 @@ pub mod nrrd;
 pub mod ome_zarr;
 mod open;
 mod opened;
+mod options;
+#[cfg(any(feature = "tiff", feature = "png"))]
+pub mod pictures;
 mod placement;
 pub mod raw;
 #[cfg(any(feature = "nifti", feature = "dicom"))]
@@ -35,6 +43,7 @@ pub mod tiff;
 #[cfg(feature = "vti")]
 pub mod vti;
 
+pub use choice::{Choice, ChoiceKind, Selection};
 pub use error::{Damage, OpenError, ReadError, Shown};
 pub use files::{ByteSource, DataFiles, Folder, NoFiles};
 pub use format::Format;
@@ -42,9 +51,10 @@ pub use limits::Limits;
 pub use note::Note;
 pub use open::{detect, open, open_raw};
 pub use opened::{Opened, WorldFrame};
+pub use options::OpenOptions;
 pub use raw::RawSpec;
 pub use samples::ByteOrder;
-pub use save::SaveError;
+pub use save::{Compression, SAVED_EXTENSIONS, SaveError, SaveOptions, save};
 
 /// The scalar types that can be read, for messages.
 pub(crate) const SCALARS: &str = "8, 16 and 32 bit integers, 32 and 64 bit floats are";

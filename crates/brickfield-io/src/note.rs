@@ -2,9 +2,10 @@
 
 use std::fmt;
 
-use brickfield_core::NonFinite;
+use brickfield_core::{NonFinite, ScalarType};
 
-use crate::error::counted;
+use crate::ChoiceKind;
+use crate::error::{Shown, counted};
 
 /// Something about a file that the volume alone does not show.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,24 +21,36 @@ pub enum Note {
     EvenSlices { n_slices: usize, min_step: f64, max_step: f64, n_even: usize, step: f64 },
     /// The slices are sheared against their normal. The grid honours it: its third direction is not the normal.
     GantryTilt { degrees: f64 },
-    /// The file has several arrays (channels, data sets); one was read.
-    SeveralArrays { kept: String, n_arrays: usize },
-    /// An axis beyond the three of space; its first entry was read.
+    /// There are several of a kind, and nobody said which to read.
+    OneOfSeveral { kind: ChoiceKind, read: String, n_entries: u64 },
+    /// An axis that is neither of space nor a choice; its first entry was read.
     FirstOfAxis { axis: String, n_entries: u64 },
+    /// Voxels have colours; their luminance was read (ITU-R BT.709).
+    Luminance,
+    /// The stored type is none of [`ScalarType`](brickfield_core::ScalarType); every value fits the one that was taken.
+    Converted { from: &'static str, to: ScalarType },
     /// The file states no usable spacing; 1 was taken.
     SpacingAssumed { axis: char, reason: &'static str },
+    /// Lengths along these axes have a unit that is no known unit of length; they were not converted.
+    UnknownUnit { axes: Vec<char>, unit: String },
     /// The file states an orientation that cannot be used; the next best statement was taken.
     OrientationIgnored { what: &'static str },
     /// The file states a rescale that cannot be used; the stored values were kept.
     RescaleIgnored { slope: f64, intercept: f64 },
-    /// A folder holds several series; the one with most slices was read.
-    SeveralSeries { kept: String, n_series: usize, n_slices_left_out: usize },
     /// Slices at a position that an earlier slice has; they were left out.
     DuplicateSlices { n_slices: usize },
-    /// Files of a folder that are not slices.
+    /// Files of a folder that are not slices, or damaged slices of other series.
     FilesSkipped { n_files: usize, first: String, reason: String },
-    /// Chunks of an OME-Zarr that are not stored; their voxels have the array's fill value.
+    /// Slices without usable positions of their own; their step is what this element states.
+    StepStated { from: &'static str, step: f64 },
+    /// A table from stored values to the modality's unit (DICOM Modality LUT); the stored values were kept.
+    ModalityLutIgnored,
+    /// Colours by number, whose table cannot be used; the numbers were read.
+    PaletteIgnored,
+    /// Chunks of an OME-Zarr, strips or tiles of a TIFF that are not stored; their voxels have the fill value (of TIFF: 0).
     MissingChunks { n_missing: u64, n_chunks: u64 },
+    /// Planes of an OME-TIFF that are in none of its files; their voxels are 0.
+    MissingPlanes { n_missing: u64, n_planes: u64 },
     /// Pages of a TIFF that are reduced copies of others.
     PagesSkipped { n_pages: usize },
     /// The file was read as raw voxels, but begins as files of a known format do.
@@ -46,6 +59,8 @@ pub enum Note {
     SurplusData,
     /// MONOCHROME1: the file wants low values shown bright. Values are as in the file.
     LowIsBright,
+    /// The file wants its values shown in some way that the volume does not have.
+    AsStored { shown: &'static str },
 }
 
 impl fmt::Display for Note {
@@ -70,30 +85,50 @@ impl fmt::Display for Note {
                 "{n_slices} slices are unevenly spaced, by {min_step:.4} to {max_step:.4}; they were resampled onto {n_even}, {step:.4} apart"
             ),
             Note::GantryTilt { degrees } => write!(f, "gantry tilt of {degrees:.2} degrees; the grid is sheared by it"),
-            Note::SeveralArrays { kept, n_arrays } => write!(f, "one of {n_arrays} arrays was read: {kept:?}"),
+            Note::OneOfSeveral { kind, read, n_entries } => {
+                write!(f, "one of {n_entries} {} was read: {read}", kind.plural())
+            }
             Note::FirstOfAxis { axis, n_entries } => {
                 write!(f, "axis {axis:?} has {n_entries} entries; the first was read")
             }
+            Note::Luminance => f.write_str("voxels have colours; their luminance was read"),
+            Note::Converted { from, to } => write!(f, "values stored as {from} were read as {to}, all exactly"),
             Note::SpacingAssumed { axis, reason } => write!(f, "spacing {axis} {reason}; 1 is used"),
+            Note::UnknownUnit { axes, unit } => {
+                write!(
+                    f,
+                    "the unit {} of lengths along {} is not known; they are used as they are",
+                    Shown::new(unit),
+                    listed(axes)
+                )
+            }
             Note::OrientationIgnored { what } => write!(f, "{what} and was ignored"),
             Note::RescaleIgnored { slope, intercept } => {
                 write!(f, "rescale by slope {slope} and intercept {intercept} was ignored")
-            }
-            Note::SeveralSeries { kept, n_series, n_slices_left_out } => {
-                let left_out = counted(n_slices_left_out, "slice was", "slices were");
-                write!(f, "one of {n_series} series was read: {kept}; {left_out} left out")
             }
             Note::DuplicateSlices { n_slices } => {
                 let slices = counted(n_slices, "slice lies", "slices lie");
                 write!(f, "{slices} where another does and {} left out", were(*n_slices))
             }
             Note::FilesSkipped { n_files, first, reason } => {
-                let files = counted(n_files, "file is no slice", "files are no slices");
+                let files = counted(n_files, "file is no slice of this volume", "files are no slices of this volume");
                 let which = if *n_files == 1 { "" } else { "first " };
                 write!(f, "{files} and {} skipped, {which}{first:?}: {reason}", were(*n_files))
             }
+            Note::StepStated { from, step } => {
+                write!(f, "slices state no positions of their own; their step {step:.4} comes from {from}")
+            }
+            Note::ModalityLutIgnored => {
+                f.write_str("the file has a table of the modality's units (Modality LUT); values are as stored")
+            }
+            Note::PaletteIgnored => f.write_str(
+                "values are numbers of colours, whose table is missing or cannot be used; values are as stored",
+            ),
             Note::MissingChunks { n_missing, n_chunks } => {
                 write!(f, "{n_missing} of {n_chunks} chunks are not stored; their voxels have the fill value")
+            }
+            Note::MissingPlanes { n_missing, n_planes } => {
+                write!(f, "{n_missing} of {n_planes} planes are not stored; their voxels are 0")
             }
             Note::PagesSkipped { n_pages } => {
                 let pages = counted(n_pages, "page", "pages");
@@ -106,7 +141,17 @@ impl fmt::Display for Note {
             Note::LowIsBright => {
                 f.write_str("the file wants low values shown bright (MONOCHROME1); values are as stored")
             }
+            Note::AsStored { shown } => write!(f, "the file wants its values shown {shown}; they are as stored"),
         }
+    }
+}
+
+/// "x", "x and y", "x, y and z".
+fn listed(axes: &[char]) -> String {
+    let names: Vec<_> = axes.iter().map(char::to_string).collect();
+    match &names[..] {
+        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+        _ => names.concat(),
     }
 }
 

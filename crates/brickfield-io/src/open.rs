@@ -1,25 +1,26 @@
 //! Opening a path, in any format.
 
 use std::fs::File;
-use std::io::{self, BufReader, Seek};
+use std::io::{BufReader, Seek};
 use std::path::Path;
 
 use crate::error::Shown;
 use crate::files::{open_regular, read_head};
+use crate::folder::visit_files;
 use crate::format::foreign;
-use crate::{Folder, Format, Limits, Note, OpenError, Opened, RawSpec, ReadError, metaimage, nrrd, raw};
+use crate::{Folder, Format, Note, OpenError, OpenOptions, Opened, RawSpec, ReadError, metaimage, nrrd, raw};
 
-/// Opens a volume: a file, or a folder of DICOM slices or OME-Zarr.
+/// Opens a volume: a file, or a folder of DICOM slices, of OME-Zarr, or of pictures.
 ///
 /// The format is told by content where it has a magic, else by extension.
 ///
 /// # Errors
 /// One line that names the path, what is wrong, the value and the bound.
-pub fn open(path: &Path, limits: &Limits) -> Result<Opened, OpenError> {
+pub fn open(path: &Path, options: &OpenOptions) -> Result<Opened, OpenError> {
     let format = detect(path)?;
     let opened = match path.is_dir() {
-        true => open_folder(path, format, limits),
-        false => open_file(path, format, limits),
+        true => open_folder(path, format, options),
+        false => open_file(path, format, options),
     };
     opened.map_err(|fault| OpenError::new(path, fault))
 }
@@ -28,15 +29,15 @@ pub fn open(path: &Path, limits: &Limits) -> Result<Opened, OpenError> {
 ///
 /// # Errors
 /// One line that names the path, what is wrong, the value and the bound.
-pub fn open_raw(path: &Path, spec: &RawSpec, limits: &Limits) -> Result<Opened, OpenError> {
-    read_raw(path, spec, limits).map_err(|fault| OpenError::new(path, fault))
+pub fn open_raw(path: &Path, spec: &RawSpec, options: &OpenOptions) -> Result<Opened, OpenError> {
+    read_raw(path, spec, options).map_err(|fault| OpenError::new(path, fault))
 }
 
-fn read_raw(path: &Path, spec: &RawSpec, limits: &Limits) -> Result<Opened, ReadError> {
+fn read_raw(path: &Path, spec: &RawSpec, options: &OpenOptions) -> Result<Opened, ReadError> {
     let mut file = buffered(path)?;
     let head = read_head(&mut file, HEAD_BYTES)?;
     file.rewind().map_err(|e| ReadError::io("the file", e))?;
-    let mut opened = raw::read(file, spec, limits)?;
+    let mut opened = raw::read(file, spec, options)?;
     if let Some(begins_like) = known_start(&head) {
         opened.notes.push(Note::ReadAsRaw { begins_like });
     }
@@ -106,21 +107,25 @@ fn detect_folder(path: &Path) -> Result<Format, ReadError> {
         return Ok(Format::OmeZarr);
     }
     let n_entries = path.read_dir().map_err(|e| ReadError::io("the folder", e))?.count();
-    match has_slice(path).map_err(|e| ReadError::io("the folder", e))? {
-        true => Ok(Format::Dicom),
-        false => Err(ReadError::UnknownFolder { n_entries }),
+    let mut slice = |name: &str| Ok(detect_file(&path.join(name)).ok().filter(|format| *format == Format::Dicom));
+    match visit_files(path, &mut slice)? {
+        Some(format) => Ok(format),
+        None if has_picture(path) => Ok(Format::Pictures),
+        None => Err(ReadError::UnknownFolder { n_entries }),
     }
 }
 
-fn has_slice(folder: &Path) -> io::Result<bool> {
-    for entry in folder.read_dir()? {
-        if let Ok(format) = detect_file(&entry?.path())
-            && format == Format::Dicom
-        {
-            return Ok(true);
+/// Whether a file of the folder is a picture.
+fn has_picture(folder: &Path) -> bool {
+    #[cfg(any(feature = "tiff", feature = "png"))]
+    for entry in folder.read_dir().into_iter().flatten().flatten() {
+        let head = buffered(&entry.path()).and_then(|mut file| read_head(&mut file, 8));
+        if head.is_ok_and(|head| crate::pictures::PictureKind::of_head(&head).is_some()) {
+            return true;
         }
     }
-    Ok(false)
+    let _ = folder;
+    false
 }
 
 fn buffered(path: &Path) -> Result<BufReader<File>, ReadError> {
@@ -128,20 +133,25 @@ fn buffered(path: &Path) -> Result<BufReader<File>, ReadError> {
     Ok(BufReader::with_capacity(1 << 16, file))
 }
 
-fn open_file(path: &Path, format: Format, limits: &Limits) -> Result<Opened, ReadError> {
+fn open_file(path: &Path, format: Format, options: &OpenOptions) -> Result<Opened, ReadError> {
     let mut file = buffered(path)?;
     let folder = Folder(path.parent().unwrap_or(Path::new("")).to_owned());
     match format {
-        Format::Nrrd => nrrd::read(file, &folder, limits),
-        Format::MetaImage => metaimage::read(file, &folder, limits),
+        Format::Nrrd => nrrd::read(file, &folder, options),
+        Format::MetaImage => metaimage::read(file, &folder, options),
         #[cfg(feature = "nifti")]
-        Format::Nifti => crate::nifti::read(file, &stem(path), &folder, limits),
+        Format::Nifti => crate::nifti::read(file, &stem(path), &folder, options),
         #[cfg(feature = "vti")]
-        Format::Vti => crate::vti::read(file, limits),
+        Format::Vti => crate::vti::read(file, options),
+        // DICOMDIR: what it lists lies beside and below it.
         #[cfg(feature = "dicom")]
-        Format::Dicom => crate::dicom::read(&[file_name(path)], &folder, limits),
+        Format::Dicom if crate::dicom::is_index(&file_name(path), &folder, &options.limits) => {
+            open_folder(&folder.0, format, options)
+        }
+        #[cfg(feature = "dicom")]
+        Format::Dicom => crate::dicom::read(&[file_name(path)], &folder, options),
         #[cfg(feature = "tiff")]
-        Format::Tiff => crate::tiff::read(file, limits),
+        Format::Tiff => crate::tiff::read(file, &folder, options),
         Format::Raw => {
             Err(ReadError::Missing { field: "the shape of a raw file (--raw NXxNYxNZ,TYPE, or `open_raw`)" })
         }
@@ -151,17 +161,26 @@ fn open_file(path: &Path, format: Format, limits: &Limits) -> Result<Opened, Rea
     }
 }
 
-fn open_folder(path: &Path, format: Format, limits: &Limits) -> Result<Opened, ReadError> {
-    #[cfg(not(any(feature = "dicom", feature = "ome-zarr")))]
-    let _ = (path, limits);
+fn open_folder(path: &Path, format: Format, options: &OpenOptions) -> Result<Opened, ReadError> {
+    #[cfg(not(any(feature = "dicom", feature = "ome-zarr", feature = "tiff", feature = "png")))]
+    let _ = (path, options);
     match format {
         #[cfg(feature = "dicom")]
         Format::Dicom => {
-            let names = file_names(path).map_err(|e| ReadError::io("the folder", e))?;
-            crate::dicom::read(&names, &Folder(path.to_owned()), limits)
+            let mut names = Vec::new();
+            visit_files::<()>(path, &mut |name| {
+                names.push(name.to_owned());
+                Ok(None)
+            })?;
+            crate::dicom::read(&names, &Folder(path.to_owned()), options)
         }
         #[cfg(feature = "ome-zarr")]
-        Format::OmeZarr => crate::ome_zarr::read(path, limits),
+        Format::OmeZarr => crate::ome_zarr::read(path, options),
+        #[cfg(any(feature = "tiff", feature = "png"))]
+        Format::Pictures => {
+            let names = file_names(path).map_err(|e| ReadError::io("the folder", e))?;
+            crate::pictures::read(&names, &Folder(path.to_owned()), options)
+        }
         _ => Err(feature_off(format)),
     }
 }
@@ -178,7 +197,7 @@ fn feature_off(format: Format) -> ReadError {
     ReadError::FeatureOff { format, feature }
 }
 
-#[cfg(feature = "dicom")]
+#[cfg(any(feature = "dicom", feature = "tiff", feature = "png"))]
 fn file_name(path: &Path) -> String {
     path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }
@@ -192,8 +211,8 @@ fn stem(path: &Path) -> String {
 }
 
 /// Names of the regular files in a folder, in order.
-#[cfg(feature = "dicom")]
-fn file_names(folder: &Path) -> io::Result<Vec<String>> {
+#[cfg(any(feature = "tiff", feature = "png"))]
+fn file_names(folder: &Path) -> std::io::Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in folder.read_dir()? {
         let path = entry?.path();

@@ -1,13 +1,15 @@
 //! The result of a reader.
 
-use brickfield_core::{Grid, Volume, Voxels};
+use brickfield_core::glam::DVec3;
+use brickfield_core::{Grid, Rescale, Volume, Voxels};
 
-use crate::{Format, Note, ReadError};
+use crate::choice::{Choices, Chosen, Entries};
+use crate::{Choice, ChoiceKind, Format, Note, OpenOptions, ReadError};
 
 /// A volume from a file, and the file's statements about it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Opened {
-    /// The volume, in the file's scalar type unless its values had to be rescaled.
+    /// The volume, in the type that the file stores, with the file's rescale.
     pub volume: Volume,
     /// The format that was read.
     pub format: Format,
@@ -17,18 +19,21 @@ pub struct Opened {
     pub unit: Option<String>,
     /// Notes that the user ought to know.
     pub notes: Vec<Note>,
+    /// What the file has several of, and which was read.
+    pub choices: Vec<Choice>,
 }
 
 /// What the axes of the world mean.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum WorldFrame {
     /// The patient: +x towards the left, +y towards the back, +z towards the head (DICOM, ITK).
     ///
     /// Every format that states an anatomical frame is brought to this one: of NIfTI, and of NRRD files in
     /// right-anterior-superior, x and y are negated.
     Lps,
-    /// A stack of pictures: +x to the right, +y down, +z into the stack (TIFF, OME-Zarr).
+    /// A stack of pictures: +x to the right, +y down, +z into the stack (TIFF, PNG, OME-Zarr).
     Pictures,
+    #[default]
     /// The axes mean what the file's author meant: VTK, raw, and files without orientation.
     Plain,
 }
@@ -39,23 +44,62 @@ pub(crate) struct FileFacts {
     pub(crate) frame: WorldFrame,
     pub(crate) unit: Option<String>,
     pub(crate) notes: Vec<Note>,
+    pub(crate) choices: Choices,
+    spacing: Option<DVec3>,
 }
 
 impl FileFacts {
-    pub(crate) fn plain(format: Format) -> FileFacts {
-        FileFacts { format, frame: WorldFrame::Plain, unit: None, notes: Vec::new() }
+    pub(crate) fn plain(format: Format, options: &OpenOptions) -> FileFacts {
+        let (choices, spacing) = (Choices::new(options.selection.clone()), options.spacing);
+        FileFacts { format, frame: WorldFrame::Plain, unit: None, notes: Vec::new(), choices, spacing }
     }
 
-    #[cfg(any(feature = "ome-zarr", feature = "tiff"))]
-    pub(crate) fn pictures(format: Format) -> FileFacts {
-        FileFacts { frame: WorldFrame::Pictures, ..FileFacts::plain(format) }
+    #[cfg(any(feature = "ome-zarr", feature = "tiff", feature = "png"))]
+    pub(crate) fn pictures(format: Format, options: &OpenOptions) -> FileFacts {
+        FileFacts { frame: WorldFrame::Pictures, ..FileFacts::plain(format, options) }
     }
 
-    pub(crate) fn finish(mut self, grid: Grid, voxels: Voxels) -> Result<Opened, ReadError> {
-        let volume = Volume::new(grid, voxels)?;
+    /// The number of the entry to read: the one that the caller wants, else the first, with a note.
+    pub(crate) fn choose(&mut self, kind: ChoiceKind, entries: Entries) -> Result<u64, ReadError> {
+        self.choose_or(kind, entries, 0)
+    }
+
+    /// The number of the entry to read: the one that the caller wants, else the one that the file prefers, with a note.
+    pub(crate) fn choose_or(&mut self, kind: ChoiceKind, entries: Entries, preferred: u64) -> Result<u64, ReadError> {
+        let Chosen { entry, is_default } = self.choices.choose(kind, entries, preferred)?;
+        if let Some(choice) = self.choices.made(kind).filter(|_| is_default) {
+            self.notes.push(Note::OneOfSeveral { kind, read: choice.label(entry), n_entries: choice.n_entries });
+        }
+        Ok(entry)
+    }
+
+    pub(crate) fn finish(self, grid: Grid, voxels: Voxels) -> Result<Opened, ReadError> {
+        self.finish_rescaled(grid, voxels, Rescale::IDENTITY)
+    }
+
+    pub(crate) fn finish_rescaled(mut self, grid: Grid, voxels: Voxels, rescale: Rescale) -> Result<Opened, ReadError> {
+        let grid = match self.spacing {
+            Some(spacing) => respaced(&grid, spacing)?,
+            None => grid,
+        };
+        let volume = Volume::rescaled(grid, voxels, rescale)?;
         if volume.non_finite().total() > 0 {
             self.notes.push(Note::NonFinite(volume.non_finite()));
         }
-        Ok(Opened { volume, format: self.format, frame: self.frame, unit: self.unit, notes: self.notes })
+        let FileFacts { format, frame, unit, notes, choices, .. } = self;
+        Ok(Opened { volume, format, frame, unit, notes, choices: choices.finish()? })
     }
+}
+
+/// The grid with another spacing; the first sample stays where it is, unless its corner was the world's origin: then the
+/// corner stays.
+fn respaced(grid: &Grid, spacing: DVec3) -> Result<Grid, ReadError> {
+    let map = grid.index_to_world();
+    let directions = map.matrix3;
+    let is_at_corner = map.translation == DVec3::ZERO;
+    let first_sample = match is_at_corner {
+        true => 0.5 * (directions * (spacing / grid.spacing())),
+        false => map.transform_point3(DVec3::splat(0.5)),
+    };
+    Ok(Grid::from_first_sample(grid.dims(), spacing, first_sample, directions)?)
 }

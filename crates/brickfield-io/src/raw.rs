@@ -10,9 +10,9 @@ use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
 use crate::placement::GridPlacement;
 use crate::samples::allocate;
-use crate::save::{SaveError, save_atomically, write_samples};
+use crate::save::{SaveError, save_atomically, values, write_samples};
 use crate::stored::{ByteSkip, DataFile, Encoding, StoredSamples};
-use crate::{ByteOrder, Format, Limits, Opened, ReadError};
+use crate::{ByteOrder, Format, OpenOptions, Opened, ReadError};
 
 /// The numbers that a raw file does not state.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,14 +40,14 @@ impl RawSpec {
 ///
 /// # Errors
 /// As [`ReadError`] lists them: a shape beyond the limits or the file, a spacing that is not above 0.
-pub fn read(mut input: impl BufRead + Seek, spec: &RawSpec, limits: &Limits) -> Result<Opened, ReadError> {
-    let shape = CheckedShape::claim(spec.dims.to_array().map(u64::from), spec.scalar, limits)?;
+pub fn read(mut input: impl BufRead + Seek, spec: &RawSpec, options: &OpenOptions) -> Result<Opened, ReadError> {
+    let shape = CheckedShape::claim(spec.dims.to_array().map(u64::from), spec.scalar, &options.limits)?;
     let grid = GridPlacement::axis_aligned(spec.spacing, 0.5 * spec.spacing).grid(shape.dims)?;
     let byte_skip = ByteSkip::Bytes(spec.skip_bytes);
     let stored = StoredSamples { encoding: Encoding::Raw, order: spec.order, line_skip: 0, byte_skip };
     let part = DataFile { name: "the file", n_samples: shape.n_voxels() as u128, n_wanted: shape.n_voxels() };
     stored.seek_samples(&mut input, &part, spec.scalar.n_bytes())?;
-    let mut found = FileFacts::plain(Format::Raw);
+    let mut found = FileFacts::plain(Format::Raw, options);
     let mut voxels = allocate(&shape)?;
     stored.append(&mut voxels, &mut input, &part, &mut found.notes)?;
     found.finish(grid, voxels)
@@ -58,5 +58,5 @@ pub fn read(mut input: impl BufRead + Seek, spec: &RawSpec, limits: &Limits) -> 
 /// # Errors
 /// If the folder cannot be written to.
 pub fn save(path: &Path, volume: &Volume, order: ByteOrder) -> Result<(), SaveError> {
-    save_atomically(path, |out| write_samples(out, volume.voxels(), order))
+    save_atomically(path, |out| write_samples(out, &values(volume), order))
 }

@@ -1,19 +1,107 @@
-//! Writing files whole or not at all.
+//! Saving volumes: whole or not at all.
 
+use std::borrow::Cow;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use brickfield_core::{Voxels, with_voxels};
+use brickfield_core::{Rescale, Volume, Voxels, with_voxels};
 
-use crate::ByteOrder;
+use crate::{ByteOrder, Format, WorldFrame, metaimage, nrrd, raw};
 
-/// A file that could not be written. An earlier file of its name is unchanged.
+/// The statements that are saved beside a volume, and how its samples are compressed.
+///
+/// ```
+/// use brickfield_io::{Compression, SaveOptions};
+/// let mut options = SaveOptions::default();
+/// options.compression = Compression::Lossless;
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct SaveOptions {
+    /// What the axes of the world mean.
+    pub frame: WorldFrame,
+    /// The unit of world lengths: "mm", "micrometer".
+    pub unit: Option<String>,
+    /// How samples are compressed.
+    pub compression: Compression,
+}
+
+/// How samples are compressed, in whatever way the format has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Compression {
+    /// As they are.
+    #[default]
+    None,
+    /// Without loss: gzip (NRRD), zlib (MetaImage), zstd (OME-Zarr). Of NIfTI the end of the name decides, `.nii` or `.nii.gz`.
+    Lossless,
+}
+
+/// Why a volume was not saved. An earlier file of its name is unchanged.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: cannot write: {source}", path.display())]
+#[non_exhaustive]
 #[allow(missing_docs)]
-pub struct SaveError {
-    pub path: PathBuf,
-    pub source: io::Error,
+pub enum SaveError {
+    #[error("{}: cannot write: {source}", path.display())]
+    Io { path: PathBuf, source: io::Error },
+    #[error("{}: the end of the name is none of {SAVED_EXTENSIONS}", path.display())]
+    UnknownExtension { path: PathBuf },
+    #[error("{}: {format} {fault}", path.display())]
+    Unsupported { path: PathBuf, format: Format, fault: String },
+}
+
+/// The ends of names that [`save`] knows, for messages and help texts.
+pub const SAVED_EXTENSIONS: &str = ".nrrd, .mha, .nii, .nii.gz, .zarr and .raw";
+
+/// Saves a volume in the format that the end of the name suggests: `.nrrd`, `.mha`, `.nii`, `.nii.gz`, `.zarr` or `.raw`.
+///
+/// Values, spacing and direction survive: a format that has no rescale gets the values (f32 if it holds all of them exactly,
+/// else f64). `.raw` holds the voxels alone.
+///
+/// # Errors
+/// If the format cannot say where the volume lies, or the folder cannot be written to.
+pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<(), SaveError> {
+    let name = path.file_name().map(|name| name.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let ends = |end: &str| name.len() > end.len() && name.ends_with(end);
+    if ends(".nrrd") {
+        nrrd::save(path, volume, options)
+    } else if ends(".mha") {
+        metaimage::save(path, volume, options)
+    } else if ends(".raw") {
+        raw::save(path, volume, ByteOrder::Little)
+    } else if ends(".nii") || ends(".nii.gz") {
+        #[cfg(feature = "nifti")]
+        return crate::nifti::save(path, volume, options);
+        #[cfg(not(feature = "nifti"))]
+        Err(feature_off(path, Format::Nifti, "nifti"))
+    } else if ends(".zarr") {
+        #[cfg(feature = "ome-zarr")]
+        return crate::ome_zarr::save(path, volume, options);
+        #[cfg(not(feature = "ome-zarr"))]
+        Err(feature_off(path, Format::OmeZarr, "ome-zarr"))
+    } else {
+        Err(SaveError::UnknownExtension { path: path.to_owned() })
+    }
+}
+
+#[cfg(not(all(feature = "nifti", feature = "ome-zarr")))]
+fn feature_off(path: &Path, format: Format, feature: &str) -> SaveError {
+    let fault = format!("is left out of this build (cargo feature `{feature}`)");
+    SaveError::Unsupported { path: path.to_owned(), format, fault }
+}
+
+/// The values of a volume's voxels: as they are stored if they stand for themselves, else f32 if that holds all of them
+/// exactly, else f64.
+pub(crate) fn values(volume: &Volume) -> Cow<'_, Voxels> {
+    let rescale = volume.rescale();
+    if rescale == Rescale::IDENTITY {
+        return Cow::Borrowed(volume.voxels());
+    }
+    let n = volume.voxels().len();
+    let is_f32 = |i: usize| f64::from(volume.value(i) as f32) == volume.value(i);
+    Cow::Owned(match (0..n).all(is_f32) {
+        true => Voxels::F32((0..n).map(|i| volume.value(i) as f32).collect()),
+        false => Voxels::F64((0..n).map(|i| volume.value(i)).collect()),
+    })
 }
 
 /// Writes to a temporary file in the same folder, and renames it into place when it is complete and on disk.
@@ -21,23 +109,30 @@ pub(crate) fn save_atomically(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&mut tempfile::NamedTempFile>) -> io::Result<()>,
 ) -> Result<(), SaveError> {
-    save_renaming(path, write).map_err(|source| SaveError { path: path.to_owned(), source })
+    save_renaming(path, write).map_err(|source| SaveError::Io { path: path.to_owned(), source })
 }
+
+/// The folder that a file lies in.
+pub(crate) fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// How the names of unfinished files and folders begin.
+pub(crate) const UNFINISHED: &str = ".brickfield-";
 
 fn save_renaming(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&mut tempfile::NamedTempFile>) -> io::Result<()>,
 ) -> io::Result<()> {
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".brickfield-");
+    builder.prefix(UNFINISHED);
     // The mode of an ordinary file (before the umask), not the private mode of temporary files.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder)?;
+    let mut file = builder.tempfile_in(folder_of(path))?;
     let mut out = BufWriter::with_capacity(1 << 16, &mut file);
     write(&mut out)?;
     out.flush()?;

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use brickfield_io::{Limits, Opened, open};
+use brickfield_io::{OpenOptions, Opened, open};
 use libtest_mimic::{Arguments, Failed, Trial};
 use serde_json::Value;
 
@@ -49,7 +49,7 @@ fn is_what_the_manifest_says(folder: &Path, name: &str) -> Result<(), Failed> {
     let manifest = manifest(folder)?;
     let (_, path, scalar, slope) = FILES.iter().find(|file| file.0 == name).ok_or("not in the table")?;
     let entry = manifest.iter().find(|e| e["name"] == name).ok_or("not in the manifest")?;
-    let opened = open(&folder.join(path), &Limits::default())?;
+    let opened = open(&folder.join(path), &OpenOptions::default())?;
     let numbers = |key: &str| -> Vec<f64> { entry[key].as_array().unwrap().iter().filter_map(Value::as_f64).collect() };
     let (grid, range) = (opened.volume.grid(), opened.volume.range());
     let dims = grid.dims().to_array().map(f64::from);
@@ -69,7 +69,7 @@ const FOREIGN: &[(&str, &str)] =
 
 fn is_refused_by_name(folder: &Path, path: &str) -> Result<(), Failed> {
     let (_, name) = FOREIGN.iter().find(|file| file.0 == path).ok_or("not in the table")?;
-    match open(&folder.join(path), &Limits::default()) {
+    match open(&folder.join(path), &OpenOptions::default()) {
         Ok(opened) => Err(format!("read as {}", summary(&opened)).into()),
         Err(e) if e.to_string().contains(name) => Ok(()),
         Err(e) => Err(format!("{e}: {name} is not named").into()),
@@ -125,7 +125,7 @@ fn half_of_it_says_how_much_came(folder: &Path, path: &str) -> Result<(), Failed
     let cut = tempfile::tempdir()?;
     let half = cut.path().join(path.file_name().ok_or("no file name")?);
     std::fs::write(&half, &bytes[..bytes.len() / 2])?;
-    let said = open(&half, &Limits::default()).map_or_else(|e| e.fault.to_string(), |o| summary(&o));
+    let said = open(&half, &OpenOptions::default()).map_or_else(|e| e.fault.to_string(), |o| summary(&o));
     let n_bytes = said.strip_prefix(before).and_then(|s| s.strip_suffix(after)).and_then(|n| n.parse().ok());
     if n_bytes.is_some_and(|n: u64| n > 500_000) { Ok(()) } else { Err(said.into()) }
 }

@@ -1,6 +1,6 @@
 //! The histogram that the automatic transfer function looks at, and its two thresholds.
 
-use brickfield_core::{Scalar, ScalarType, ValueRange, Volume, with_voxels};
+use brickfield_core::{Rescale, Scalar, ScalarType, ValueRange, Volume, with_voxels};
 
 /// Counts of data values in bins of one width; values outside the range are not counted.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,8 +24,15 @@ const MAX_BINS: usize = 512;
 const PADDING_GAP: f64 = 0.08;
 /// The values without the padding must fill at least this many bins: two labels are not a padding and a volume.
 const LEAST_OCCUPIED: usize = 32;
-/// Looks at the volume at most so often.
+/// Looks at the volume at most so often for its padding.
 const MAX_PASSES: usize = 4;
+/// The brightest share of all voxels that may be burnt in (letters, a marker) or stray.
+const STRAY_SHARE: f64 = 1e-3;
+/// Cuts the stray values off at most so often.
+const MAX_CUTS: usize = 3;
+/// The values that are left must have this share outside of the fullest heap, so many of its standard deviations from its peak.
+const LEAST_OUTSIDE: f64 = 0.01;
+const HEAP_DEVIATIONS: f64 = 4.0;
 
 impl VolumeHistogram {
     /// The histogram of a volume without its padding: lone values at either end (-1500 below air at -1000, 1e30 where
@@ -44,18 +51,55 @@ impl VolumeHistogram {
         kept
     }
 
+    /// The histogram without the few brightest voxels, as long as these take up more than half of the range and the others are
+    /// more than one heap: letters beside a head do not hide it, and beads in a noisy background stay.
+    pub(crate) fn without_stray_values(self, volume: &Volume) -> VolumeHistogram {
+        let mut kept = self;
+        for _ in 0..MAX_CUTS {
+            let last = kept.quantile(0, kept.n_bins(), 1.0 - STRAY_SHARE);
+            if 2 * (last + 1) > kept.n_bins() || kept.bins[last].count == 0 {
+                break;
+            }
+            let candidate = VolumeHistogram::over(volume, ValueRange { min: kept.range.min, max: kept.bins[last].max });
+            if candidate.share_outside_heap() < LEAST_OUTSIDE {
+                break;
+            }
+            kept = candidate;
+        }
+        kept
+    }
+
+    /// The share of voxels that lie outside of the fullest heap, taken for a Gaussian as wide as at half its height.
+    fn share_outside_heap(&self) -> f64 {
+        let n = self.n_bins();
+        let peak = self.mode(0, n);
+        let is_high = |b: &usize| 2 * self.count(*b) >= self.count(peak);
+        let above = (peak..n).take_while(is_high).count();
+        let below = (0..=peak).rev().take_while(is_high).count();
+        // Half the width at half the height is sqrt(2 ln 2) standard deviations. A heap that one end of the range cuts has one side.
+        let deviation =
+            (above.min(below).max(above.max(below) / 2) as f64 - 0.5) / (2.0 * std::f64::consts::LN_2).sqrt();
+        let reach = (HEAP_DEVIATIONS * deviation).ceil() as usize;
+        let inside = self.total(peak.saturating_sub(reach), (peak + reach + 1).min(n));
+        1.0 - inside as f64 / self.total(0, n).max(1) as f64
+    }
+
     fn over(volume: &Volume, range: ValueRange) -> VolumeHistogram {
         let span = range.max - range.min;
         let width = match volume.scalar_type() {
             ScalarType::F32 | ScalarType::F64 => span / MAX_BINS as f64,
-            _ => ((span + 1.0) / MAX_BINS as f64).ceil(),
+            _ => {
+                // Whole numbers of stored integers, so that bins hold equally many of them.
+                let unit = volume.rescale().slope().abs();
+                ((span / unit + 1.0) / MAX_BINS as f64).ceil() * unit
+            }
         };
         if !(width.is_finite() && width > 0.0) {
             return VolumeHistogram { range, width: 0.0, bins: vec![Bin { count: 1, min: range.min, max: range.max }] };
         }
         let n = ((span / width) as usize + 1).min(MAX_BINS);
         let mut bins = vec![Bin { count: 0, min: f64::INFINITY, max: f64::NEG_INFINITY }; n];
-        with_voxels!(volume.voxels(), v => count(v, range, width, &mut bins));
+        with_voxels!(volume.voxels(), v => count(v, volume.rescale(), range, width, &mut bins));
         VolumeHistogram { range, width, bins }
     }
 
@@ -128,11 +172,11 @@ impl VolumeHistogram {
     }
 }
 
-fn count<T: Scalar>(values: &[T], range: ValueRange, width: f64, bins: &mut [Bin]) {
+fn count<T: Scalar>(stored: &[T], rescale: Rescale, range: ValueRange, width: f64, bins: &mut [Bin]) {
     let last = bins.len() - 1;
     let per_width = 1.0 / width;
-    for v in values {
-        let x = v.to_f64();
+    for v in stored {
+        let x = rescale.value(v.to_f64());
         if range.contains(x) {
             let bin = &mut bins[(((x - range.min) * per_width) as usize).min(last)];
             bin.count += 1;
@@ -237,6 +281,23 @@ mod tests {
         assert_eq!(VolumeHistogram::without_padding(&masked).range().min, 0.0);
         let h = VolumeHistogram::without_padding(&volume(vec![0u8, 0, 0, 255, 255]));
         assert_eq!(h.range(), ValueRange { min: 0.0, max: 255.0 });
+    }
+
+    #[test]
+    fn a_few_bright_values_are_left_out_if_the_others_are_more_than_one_heap() {
+        let cut = |values: Vec<i16>| {
+            let volume = volume(values);
+            VolumeHistogram::without_padding(&volume).without_stray_values(&volume).range().max
+        };
+        let head = |i: i16| if i % 3 == 0 { 500 + i % 70 } else { i % 7 };
+        let letters = (0..10).map(|i| 9000 + 37 * i);
+        assert_eq!(cut((0..20_000).map(head).chain(letters.clone()).collect()), 569.0);
+        // A tenth of all voxels are no letters.
+        let bones = (0..2000).map(|i| 9000 + i % 97);
+        assert_eq!(cut((0..20_000).map(head).chain(bones).collect()), 9096.0);
+        // Noise around one value has nothing else to show than the few bright ones.
+        let noise = |i: i16| (0..12).map(|k| (i32::from(i) * 7919 + k * 104_729) % (101 + k) / 12).sum::<i32>() as i16;
+        assert_eq!(cut((0..20_000).map(noise).chain(letters).collect()), 9333.0);
     }
 
     #[test]

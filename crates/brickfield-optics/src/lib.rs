@@ -4,6 +4,7 @@ mod automatic;
 #[cfg(feature = "color")]
 mod difference;
 mod histogram;
+mod narrow_peak;
 mod opacity;
 #[cfg(feature = "color")]
 mod presets;
@@ -16,6 +17,7 @@ mod transfer_file;
 pub use automatic::{automatic, diagonal_world};
 #[cfg(feature = "color")]
 pub use difference::{ColorDifferences, ColorMetric, PixelCountError};
+pub use narrow_peak::{NarrowPeak, narrow_peak};
 pub use opacity::{OPAQUE_DEPTH, alpha, depth, rescale_alpha, transmittance};
 #[cfg(feature = "color")]
 pub use presets::{Preset, PresetScale};

@@ -99,8 +99,10 @@ impl Residency {
             return field.clone();
         }
         let range = tree.summary(tree.layout().root()).range;
-        let (format, decode) = SampleFormat::encoding(tree.scalar_type(), range);
-        self.copied = self.table.hold(bricks, |id| gather(tree, id, format, decode));
+        let stored_range = tree.rescale().stored_range(range);
+        let (format, stored) = SampleFormat::encoding(tree.scalar_type(), stored_range);
+        self.copied = self.table.hold(bricks, |id| gather(tree, id, format, stored));
+        let decode = stored.rescaled(tree.rescale());
         let side = tree.layout().side();
         let slots = Slots::new(format, decode, Places::Even(side), self.table.samples.clone());
         let index = self.table.index(tree);

@@ -7,9 +7,8 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use brickfield::core::glam::{DVec3, UVec3};
-use brickfield::core::{Grid, Volume};
-use brickfield::io::WorldFrame;
-use brickfield::io::nrrd::{self, NrrdEncoding};
+use brickfield::core::{Grid, Rescale, Volume};
+use brickfield::io::{OpenOptions, SaveOptions, open, save};
 
 /// A folder with a volume of 12 x 10 x 8 voxels, and the command run in it.
 struct WorkFolder {
@@ -21,7 +20,7 @@ impl WorkFolder {
         let folder = tempfile::tempdir().unwrap();
         let grid = Grid::axis_aligned(UVec3::new(12, 10, 8), DVec3::new(1.0, 1.0, 4.22 + 6e-15)).unwrap();
         let volume = Volume::new(grid, (0..960).map(|i| (i % 251) as u8).collect::<Vec<_>>()).unwrap();
-        nrrd::save(&folder.path().join("a.nrrd"), &volume, WorldFrame::Plain, NrrdEncoding::Raw).unwrap();
+        save(&folder.path().join("a.nrrd"), &volume, &SaveOptions::default()).unwrap();
         WorkFolder { folder }
     }
 
@@ -53,6 +52,52 @@ fn info_says_what_the_file_holds() {
 }
 
 #[test]
+fn scripts_read_json() {
+    let out = WorkFolder::new().run("info|a.nrrd|--json|--spacing|2:2:3");
+    let said: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(said["dimensions"], serde_json::json!([12, 10, 8]));
+    assert_eq!((&said["type"], &said["values"]["max"]), (&"u8".into(), &250.0.into()));
+    assert_eq!(said["spacing"], serde_json::json!([2.0, 2.0, 3.0]));
+    assert_eq!(said["first_sample"], serde_json::json!([1.0, 1.0, 1.5]));
+}
+
+#[test]
+fn rescaled_integers_take_the_bytes_of_integers() {
+    let place = WorkFolder::new();
+    let plain = open(&place.path().join("a.nrrd"), &OpenOptions::default()).unwrap().volume;
+    let rescale = Rescale::new(0.5, -1024.0).unwrap();
+    let volume = Volume::rescaled(*plain.grid(), plain.voxels().clone(), rescale).unwrap();
+    save(&place.path().join("b.nii"), &volume, &SaveOptions::default()).unwrap();
+    let said: serde_json::Value = serde_json::from_slice(&place.run("info|b.nii|--json").stdout).unwrap();
+    assert_eq!((&said["type"], &said["bytes"]), (&"u8".into(), &960.into()));
+    assert_eq!(said["values"], serde_json::json!({ "min": -1024.0, "max": -899.0 }));
+    let bricks = |file: &str| {
+        let out = place.run(&format!("render|{file}|-o|{file}.png|{SMALL}"));
+        let said = text(&out.stdout);
+        said.lines().find(|line| line.contains("bricks,")).map(str::to_owned).expect("a line about bricks")
+    };
+    // One byte a sample, in the atlas too.
+    assert_eq!(bricks("b.nii"), bricks("a.nrrd"));
+}
+
+#[test]
+fn a_volume_is_saved_in_another_format() {
+    let place = WorkFolder::new();
+    let original = open(&place.path().join("a.nrrd"), &OpenOptions::default()).unwrap();
+    for name in ["b.mha", "b.nii.gz", "b.zarr", "b.nrrd"] {
+        let out = place.run(&format!("convert|a.nrrd|-o|{name}"));
+        assert_eq!(text(&out.stdout), format!("{name}: 12 x 10 x 8 voxels of u8\n"), "{}", text(&out.stderr));
+        let saved = open(&place.path().join(name), &OpenOptions::default()).unwrap();
+        assert_eq!(saved.volume.voxels(), original.volume.voxels(), "{name}");
+    }
+    let refused = place.run("convert|a.nrrd|-o|b.tif");
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(text(&refused.stderr).contains("the end of the name is none of .nrrd"), "{}", text(&refused.stderr));
+    let refused = place.run("info|a.nrrd|--channel|2");
+    assert!(text(&refused.stderr).contains("channel is \"2\"; expected 0"), "{}", text(&refused.stderr));
+}
+
+#[test]
 fn a_picture_is_written_and_what_the_volume_lacks_is_said() {
     let place = WorkFolder::new();
     let out = place.run("render|a.nrrd|-o|a.png|--backend|cpu|--size|8x6|--lod|9|--clip|0:6,0:10,0:99|--step|1/4");
@@ -60,6 +105,28 @@ fn a_picture_is_written_and_what_the_volume_lacks_is_said() {
     assert_eq!(out.status.code(), Some(0), "{said}");
     assert!(said.contains("--lod 9: the volume has levels 0 to 0") && said.contains("--clip"), "{said}");
     assert_eq!(image::open(place.path().join("a.png")).unwrap().width(), 8);
+}
+
+#[test]
+fn a_peak_that_samples_step_over_is_integrated() {
+    let place = WorkFolder::new();
+    let knots = |width: f64| {
+        format!(
+            r##"{{"knots": [{{"value": {}, "extinction": 0, "srgb": "#ffffff"}}, {{"value": 100, "extinction": 3, "srgb": "#ffffff"}},
+                {{"value": {}, "extinction": 0, "srgb": "#ffffff"}}]}}"##,
+            100.0 - width,
+            100.0 + width
+        )
+    };
+    // Values rise by 1 a voxel along x, by 12 along y and by 120 along z.
+    for (width, rule, is_told) in [(0.25, "pre-integrated", true), (60.0, "midpoint", false)] {
+        std::fs::write(place.path().join("peak.json"), knots(width)).unwrap();
+        let out = place.run(&format!("render|a.nrrd|-o|a.png|{SMALL}|--transfer|peak.json"));
+        assert_eq!(text(&out.stderr).contains("--rule pre-integrated is taken"), is_told, "{}", text(&out.stderr));
+        assert!(text(&out.stdout).contains(rule), "{}", text(&out.stdout));
+        let asked = place.run(&format!("render|a.nrrd|-o|a.png|{SMALL}|--transfer|peak.json|--rule|gauss2"));
+        assert!(text(&asked.stdout).contains("gauss2") && asked.stderr.is_empty());
+    }
 }
 
 #[test]

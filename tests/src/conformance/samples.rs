@@ -42,7 +42,7 @@ impl Samples for VolumeSamples<'_> {
             |c: usize| (low.as_uvec3() + UVec3::new(c as u32 & 1, c as u32 >> 1 & 1, c as u32 >> 2)).min(dims - 1);
         let value = |c: usize| {
             let p = corner(c);
-            self.0.voxels().at(p.x as usize + dims.x as usize * (p.y as usize + dims.y as usize * p.z as usize))
+            self.0.value(p.x as usize + dims.x as usize * (p.y as usize + dims.y as usize * p.z as usize))
         };
         Some(Corners { values: std::array::from_fn(value), fraction: q - low })
     }

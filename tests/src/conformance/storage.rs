@@ -100,7 +100,7 @@ fn averages(plan: &FramePlan, volume: &Volume) -> Field {
 /// The linear field of a volume's samples, beyond the outer ones too.
 fn linear(volume: &Volume) -> impl Fn(DVec3) -> f64 {
     let dims = volume.grid().dims();
-    let at = |p: UVec3| volume.voxels().at((p.x + dims.x * (p.y + dims.y * p.z)) as usize);
+    let at = |p: UVec3| volume.value((p.x + dims.x * (p.y + dims.y * p.z)) as usize);
     let (origin, last) = (at(UVec3::ZERO), dims - 1);
     let slope = |axis: usize| {
         let mut end = UVec3::ZERO;

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use brickfield::bricks::{BrickTree, BuildOptions, Downsampling, build_tree};
 use brickfield::frame::{Backend, Mode};
-use brickfield::io::{Limits, WorldFrame, open};
+use brickfield::io::{OpenOptions, WorldFrame, open};
 use brickfield::optics::automatic;
 use brickfield::{BackendKind, Scene, Skipping, Validation, Viewpoint, open_backend};
 use brickfield_core::glam::UVec2;
@@ -112,7 +112,7 @@ fn phantom(voxels: u32, phantoms: &mut Phantoms, size: UVec2) -> Result<Exhibit,
 }
 
 fn real(name: &str, path: &Path, size: UVec2) -> Result<Exhibit, String> {
-    let volume = open(path, &Limits::default()).map_err(|e| e.to_string())?.volume;
+    let volume = open(path, &OpenOptions::default()).map_err(|e| e.to_string())?.volume;
     let camera = Viewpoint::default().camera(volume.grid(), WorldFrame::Plain, size).map_err(|e| e.to_string())?;
     let scene = Scene::new(camera, size, automatic(&volume));
     Ok(Exhibit { name: name.to_owned(), volume: Arc::new(volume), scene })

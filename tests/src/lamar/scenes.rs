@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use brickfield::bricks::{BrickTree, BuildOptions, Downsampling, build_tree};
 use brickfield::frame::{Backend, Division, Placement, Target};
-use brickfield::io::{Limits, WorldFrame, open};
+use brickfield::io::{OpenOptions, WorldFrame, open};
 use brickfield::lod::Criterion;
 use brickfield::optics::automatic;
 use brickfield::{Scene, Technique, Viewpoint};
@@ -68,7 +68,7 @@ fn named(args: &LamarArgs) -> Result<Vec<(String, PathBuf)>, LamarError> {
 }
 
 fn data_set(name: String, path: &Path) -> Result<DataSet, LamarError> {
-    let opened = open(path, &Limits::default())?;
+    let opened = open(path, &OpenOptions::default())?;
     let transfer = automatic(&opened.volume);
     Ok(DataSet { name, transfer, frame: opened.frame, volume: opened.volume })
 }

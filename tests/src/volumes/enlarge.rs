@@ -51,7 +51,7 @@ fn blend(volume: &Volume, (y, z): (u32, u32), factor: u32, row: &mut [f64]) {
     let dims = volume.grid().dims();
     let ((y0, y1, fy), (z0, z1, fz)) = (weight(y, dims.y, factor), weight(z, dims.z, factor));
     let (nx, ny) = (dims.x as usize, dims.y as usize);
-    let at = |x: usize, y: usize, z: usize| volume.voxels().at(x + nx * (y + ny * z));
+    let at = |x: usize, y: usize, z: usize| volume.value(x + nx * (y + ny * z));
     for (x, to) in row.iter_mut().enumerate() {
         let low = at(x, y0, z0) * (1.0 - fy) + at(x, y1, z0) * fy;
         let high = at(x, y0, z1) * (1.0 - fy) + at(x, y1, z1) * fy;
@@ -80,7 +80,7 @@ mod tests {
         let expected = fill(large.grid(), ScalarType::U8, field);
         for at in [UVec3::new(2, 2, 2), UVec3::new(9, 11, 13), UVec3::new(17, 21, 25)] {
             let i = (at.x + 20 * (at.y + 24 * at.z)) as usize;
-            assert!((large.voxels().at(i) - expected.voxels().at(i)).abs() <= 1.0, "{at}");
+            assert!((large.value(i) - expected.value(i)).abs() <= 1.0, "{at}");
         }
     }
 

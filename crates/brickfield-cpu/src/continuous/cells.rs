@@ -135,10 +135,9 @@ impl<'a> Cells<'a> {
         let dims = self.volume.grid().dims();
         let high = (low + 1).min(dims - 1);
         let (nx, nxy) = (dims.x as usize, dims.x as usize * dims.y as usize);
-        let voxels = self.volume.voxels();
         std::array::from_fn(|i| {
             let pick = |axis: usize| if i >> axis & 1 == 0 { low[axis] } else { high[axis] } as usize;
-            voxels.at(pick(0) + nx * pick(1) + nxy * pick(2))
+            self.volume.value(pick(0) + nx * pick(1) + nxy * pick(2))
         })
     }
 }
@@ -196,7 +195,7 @@ fn range(volume: &Volume, low: UVec3, high: UVec3) -> ValueRange {
         for y in low.y..=high.y {
             let row = dims.x as usize * (y as usize + dims.y as usize * z as usize);
             for x in low.x..=high.x {
-                let value = volume.voxels().at(row + x as usize);
+                let value = volume.value(row + x as usize);
                 range = ValueRange { min: range.min.min(value), max: range.max.max(value) };
             }
         }

@@ -164,7 +164,7 @@ fn brick(setup: &Setup, layout: &BrickLayout, id: BrickId, format: SampleFormat,
         let local = UVec3::new(i % n, i / n % n, i / (n * n));
         let p = ((origin + local) << u32::from(id.level.0)).min(dims - 1);
         let at = p.x as usize + dims.x as usize * (p.y as usize + dims.y as usize * p.z as usize);
-        let value = setup.volume.voxels().at(at);
+        let value = setup.volume.value(at);
         (min, max) = (min.min(value), max.max(value));
         let stored = (value - decode.offset) / decode.scale * format.unit();
         match format {

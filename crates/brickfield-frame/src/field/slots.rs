@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use brickfield_core::glam::UVec3;
-use brickfield_core::{BrickSide, Place, ScalarType, ValueRange};
+use brickfield_core::{BrickSide, Place, Rescale, ScalarType, ValueRange};
 
 use crate::{Chunk, Chunked, ContentId, PlaceUniform};
 
@@ -28,7 +28,7 @@ impl SampleFormat {
         }
     }
 
-    /// How the native samples of `scalar` with values in `range` are stored: format and decoding.
+    /// How the samples of `scalar` with stored numbers in `range` are held: format and decoding.
     ///
     /// 8 and 16 bits keep their integers (signed ones shifted by half their range). 32-bit integers and f64 become f32
     /// relative to the middle of the range and in units of half of it, so that the digits of f32 are spent on the range.
@@ -92,6 +92,11 @@ impl Decode {
     #[inline]
     pub fn value(self, read: f64) -> f64 {
         read * self.scale + self.offset
+    }
+
+    /// The decoding of samples whose stored numbers stand for other values.
+    pub fn rescaled(self, rescale: Rescale) -> Decode {
+        Decode { scale: self.scale * rescale.slope(), offset: rescale.value(self.offset) }
     }
 }
 

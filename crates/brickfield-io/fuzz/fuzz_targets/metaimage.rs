@@ -6,5 +6,5 @@ use brickfield_io::{Limits, NoFiles, metaimage};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
-    let _ = metaimage::read(Cursor::new(bytes), &NoFiles, &Limits { max_bytes: 1 << 20 });
+    let _ = metaimage::read(Cursor::new(bytes), &NoFiles, &Limits { max_bytes: 1 << 20 }.into());
 });

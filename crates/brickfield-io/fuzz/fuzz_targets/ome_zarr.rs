@@ -1,26 +1,13 @@
 #![no_main]
 
-use std::collections::BTreeMap;
-
 use brickfield_io::{Limits, ome_zarr};
 use libfuzzer_sys::fuzz_target;
 
+#[path = "entries.rs"]
+mod entries;
 #[path = "panics.rs"]
 mod panics;
 
 fuzz_target!(init: panics::abort_on_ours(), |bytes: &[u8]| {
-    let _ = ome_zarr::read_entries(&entries(bytes), &Limits { max_bytes: 1 << 20 });
+    let _ = ome_zarr::read_entries(&entries::entries(bytes), &Limits { max_bytes: 1 << 20 }.into());
 });
-
-/// Entries as name, line end, length (4 bytes, little-endian), content; the last one may be cut short.
-fn entries(mut bytes: &[u8]) -> BTreeMap<String, Vec<u8>> {
-    let mut entries = BTreeMap::new();
-    while let Some(end) = bytes.iter().position(|b| *b == b'\n') {
-        let name = String::from_utf8_lossy(&bytes[..end]).into_owned();
-        let Some((length, rest)) = bytes[end + 1..].split_first_chunk::<4>() else { break };
-        let n = (u32::from_le_bytes(*length) as usize).min(rest.len());
-        entries.insert(name, rest[..n].to_vec());
-        bytes = &rest[n..];
-    }
-    entries
-}

@@ -6,5 +6,5 @@ use brickfield_io::{Limits, vti};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
-    let _ = vti::read(Cursor::new(bytes), &Limits { max_bytes: 1 << 20 });
+    let _ = vti::read(Cursor::new(bytes), &Limits { max_bytes: 1 << 20 }.into());
 });

@@ -1,85 +1,111 @@
-//! From the pixel data of slices to voxels.
+//! From the frames of slices to voxels.
 
-use brickfield_core::{Scalar, ScalarType, ValueRange, Voxels, with_voxels};
-use dicom_dictionary_std::tags;
-use dicom_object::DefaultDicomObject;
-use dicom_pixeldata::PixelDecoder;
+use std::ops::Range;
+use std::rc::Rc;
 
-use super::slice::{Bits, ReadExtent, Slice, read_object};
-use crate::error::bytes;
-use crate::error::check_length;
-use crate::files::{DataFiles, open_named};
+use brickfield_core::{Rescale, Scalar, ScalarType, ValueRange, Voxels, with_voxels};
+
+use super::colours::interleaved_rgb;
+use super::frame_bytes::FrameReader;
+use super::image::{Bits, Image};
+use super::slice::Slice;
+use crate::colour::{ColourPart, Colours};
+use crate::files::DataFiles;
 use crate::guard::guarded;
 use crate::limits::{CheckedShape, Limits, check_bytes};
-use crate::rescale::{Rescale, rescaled_type};
 use crate::samples::{allocate, append_binary, with_room};
 use crate::{ByteOrder, Note, ReadError};
 
-/// The stored values of all slices, in the type that the first one has.
-pub(super) fn read_stored(slices: &[Slice], shape: &CheckedShape, files: &dyn DataFiles) -> Result<Voxels, ReadError> {
+/// The stored values of all slices, in the type of the shape; of colours the part that is wanted.
+pub(super) fn read_stored(
+    slices: &[Slice],
+    shape: &CheckedShape,
+    part: ColourPart,
+    files: &dyn DataFiles,
+    limits: &Limits,
+) -> Result<Voxels, ReadError> {
     let mut voxels = allocate(shape)?;
+    let mut reader = FrameReader::new(files, limits);
+    let mut last: Option<(Rc<Image>, u32, Voxels)> = None;
     for slice in slices {
-        let bytes = guarded("DICOM pixel", || decode(slice, files))?;
-        append_binary(&mut voxels, &mut bytes.as_slice(), slice.n_samples(), ByteOrder::Little, &slice.name)?;
-        keep_stored_bits(&mut voxels, slice.n_samples(), slice.bits);
+        // The tiles of a mosaic share a frame.
+        let is_same =
+            |(image, frame, _): &(Rc<Image>, u32, Voxels)| Rc::ptr_eq(image, &slice.image) && *frame == slice.frame;
+        let frame = match last.take().filter(is_same) {
+            Some((_, _, frame)) => frame,
+            None => guarded("DICOM pixel", || frame_voxels(&mut reader, &slice.image, slice.frame, part, limits))?,
+        };
+        append_tile(&mut voxels, &frame, slice);
+        last = Some((slice.image.clone(), slice.frame, frame));
     }
     Ok(voxels)
 }
 
-fn decode(slice: &Slice, files: &dyn DataFiles) -> Result<Vec<u8>, ReadError> {
-    let object = read_object(&mut *open_named(files, &slice.name)?, ReadExtent::WithPixels)?;
-    check_fragments(&object, slice)?;
-    let expected_bytes = slice.n_samples() as u128 * u128::from(slice.bits.n_allocated / 8);
-    let what = || format!("the pixels of {:?}, {} promised", slice.name, bytes(expected_bytes));
-    let decoded = object.decode_pixel_data_frame(0).map_err(|e| ReadError::decoder(what(), e))?;
-    check_length(&slice.name, decoded.data().len() as u64, expected_bytes)?;
-    Ok(decoded.into_data())
+fn frame_voxels(
+    reader: &mut FrameReader,
+    image: &Rc<Image>,
+    frame: u32,
+    part: ColourPart,
+    limits: &Limits,
+) -> Result<Voxels, ReadError> {
+    let bytes = reader.read(image, frame)?;
+    let n_samples = image.n_stored_samples() as usize;
+    let shape = CheckedShape::claim([n_samples as u64, 1, 1], image.scalar, limits)?;
+    let mut samples = allocate(&shape)?;
+    append_binary(&mut samples, &mut bytes.as_slice(), n_samples, ByteOrder::Little, &image.name)?;
+    keep_stored_bits(&mut samples, n_samples, image.bits);
+    match image.colour.is_grey() {
+        true => Ok(samples),
+        false => Ok(Colours::Rgb.reduce(interleaved_rgb(samples, image)?, part)),
+    }
 }
 
-/// JPEG states its size once more; a decoder would allocate by it.
-fn check_fragments(object: &DefaultDicomObject, slice: &Slice) -> Result<(), ReadError> {
-    let missing = || ReadError::decoder(format!("slice {:?}", slice.name), ReadError::Missing { field: "PixelData" });
-    let element = object.get(tags::PIXEL_DATA).ok_or_else(missing)?;
-    let Some(fragments) = element.fragments() else {
-        let expected_bytes = slice.n_samples() as u128 * u128::from(slice.bits.n_allocated / 8);
-        let n_bytes = element.to_bytes().map_or(0, |b| b.len() as u64);
-        return check_length(&slice.name, n_bytes, expected_bytes);
+/// Appends the slice's part of its frame, in the type of `out`.
+fn append_tile(out: &mut Voxels, frame: &Voxels, slice: &Slice) {
+    let [column, row] = slice.corner.map(|n| n as usize);
+    let (columns, pitch) = (slice.columns as usize, slice.image.columns as usize);
+    let rows = (row..row + slice.rows as usize).map(|r| r * pitch + column..r * pitch + column + columns);
+    macro_rules! same_type {
+        ($($t:ident)*) => {
+            match (out, frame) {
+                $((Voxels::$t(out), Voxels::$t(frame)) => rows.for_each(|row| out.extend_from_slice(&frame[row])),)*
+                (out, frame) => with_voxels!(out, o => rows.for_each(|row| append_as(o, frame, row))),
+            }
+        };
+    }
+    same_type!(U8 I8 U16 I16 U32 I32 F32 F64);
+}
+
+fn append_as<T: Scalar>(out: &mut Vec<T>, frame: &Voxels, row: Range<usize>) {
+    with_voxels!(frame, f => out.extend(f[row].iter().map(|v| T::from_f64(v.to_f64()))));
+}
+
+/// The type that holds the stored values of all slices.
+pub(super) fn common_scalar(slices: &[Slice], notes: &mut Vec<Note>) -> ScalarType {
+    let first = slices[0].image.value_scalar();
+    if slices.iter().all(|slice| slice.image.value_scalar() == first) {
+        return first;
+    }
+    let to = match slices.iter().any(|slice| slice.image.is_float()) {
+        true => ScalarType::F64,
+        false => {
+            let none = ValueRange { min: f64::INFINITY, max: f64::NEG_INFINITY };
+            let range = slices.iter().fold(none, |range, slice| range.union(slice.image.value_range()));
+            INTEGERS.into_iter().find(|t| fits(range, *t)).unwrap_or(ScalarType::F64)
+        }
     };
-    if !object.meta().transfer_syntax().starts_with(JPEG_SYNTAXES) {
-        return Ok(());
-    }
-    let size = jpeg_size(&fragments.concat()).ok_or(ReadError::Missing { field: "the JPEG frame header" })?;
-    if size != [slice.columns, slice.rows] {
-        let expected = format!("{} x {}, as the data set has it", slice.columns, slice.rows);
-        return Err(ReadError::field("JPEG frame", format!("{} x {}", size[0], size[1]), expected));
-    }
-    Ok(())
+    notes.push(Note::Converted { from: "several types", to });
+    to
 }
 
-const JPEG_SYNTAXES: &str = "1.2.840.10008.1.2.4.";
-
-/// Columns and rows of the first frame header, if these bytes are the start of a JPEG.
-fn jpeg_size(bytes: &[u8]) -> Option<[u64; 2]> {
-    let mut at = bytes.strip_prefix(&[0xff, 0xd8])?;
-    while let [0xff, marker, rest @ ..] = at {
-        if *marker == 0xff {
-            at = &at[1..];
-            continue;
-        }
-        let length = usize::from(u16::from_be_bytes([*rest.first()?, *rest.get(1)?]));
-        if matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc) {
-            let word = |i: usize| Some(u64::from(u16::from_be_bytes([*rest.get(i)?, *rest.get(i + 1)?])));
-            return Some([word(5)?, word(3)?]);
-        }
-        at = rest.get(length..)?;
-    }
-    None
-}
+const INTEGERS: [ScalarType; 6] =
+    [ScalarType::U8, ScalarType::I8, ScalarType::U16, ScalarType::I16, ScalarType::U32, ScalarType::I32];
 
 /// Moves the stored bits of the last `n` samples to the low end, and fills the others with the sign.
 fn keep_stored_bits(voxels: &mut Voxels, n: usize, bits: Bits) {
     let left = bits.n_allocated - 1 - bits.high;
     let right = bits.n_allocated - bits.n_stored;
+    // Samples of one bit have been unpacked.
     if right == 0 {
         return;
     }
@@ -100,24 +126,36 @@ fn keep_stored_bits(voxels: &mut Voxels, n: usize, bits: Bits) {
     }
 }
 
-/// The values that the modality means, slice by slice.
+/// Voxels, and the map from them to values.
+pub(super) struct Rescaled {
+    pub(super) voxels: Voxels,
+    pub(super) rescale: Rescale,
+}
+
+/// The values that the modality means. A rescale that all slices share and that is not integral is the volume's: voxels stay as
+/// they are stored. Else the values are computed, slice by slice.
 pub(super) fn rescaled_slices(
     stored: Voxels,
     slices: &[Slice],
     limits: &Limits,
     notes: &mut Vec<Note>,
-) -> Result<Voxels, ReadError> {
+) -> Result<Rescaled, ReadError> {
     let mut unusable = Vec::new();
     let rescales: Vec<Rescale> = slices.iter().map(|s| s.rescale.usable(&mut unusable)).collect();
     notes.extend(unusable.into_iter().take(1));
-    if rescales.iter().all(|r| *r == Rescale::IDENTITY) {
-        return Ok(stored);
+    let is_integral = |r: &Rescale| r.slope().fract() == 0.0 && r.intercept().fract() == 0.0;
+    let are_alike = rescales.iter().all(|r| *r == rescales[0]);
+    if are_alike && (rescales[0] == Rescale::IDENTITY || !is_integral(&rescales[0])) {
+        return Ok(Rescaled { voxels: stored, rescale: rescales[0] });
     }
     let n_per_slice = slices[0].n_samples();
-    let to = target_type(&stored, &rescales, n_per_slice);
+    let to = match rescales.iter().all(is_integral) {
+        true => integral_type(&stored, &rescales, n_per_slice),
+        false => rescaled_type(stored.scalar_type()),
+    };
     let n_bytes = stored.len() as u128 * to.n_bytes() as u128;
     check_bytes(n_bytes, limits, || format!("the volume rescaled to {to}"))?;
-    match to {
+    let voxels = match to {
         ScalarType::U8 => apply::<u8>(&stored, &rescales, n_per_slice),
         ScalarType::I8 => apply::<i8>(&stored, &rescales, n_per_slice),
         ScalarType::U16 => apply::<u16>(&stored, &rescales, n_per_slice),
@@ -126,14 +164,20 @@ pub(super) fn rescaled_slices(
         ScalarType::I32 => apply::<i32>(&stored, &rescales, n_per_slice),
         ScalarType::F32 => apply::<f32>(&stored, &rescales, n_per_slice),
         ScalarType::F64 => apply::<f64>(&stored, &rescales, n_per_slice),
+    }?;
+    Ok(Rescaled { voxels, rescale: Rescale::IDENTITY })
+}
+
+/// The type that holds values of unlike slices: f64 where f32 would lose digits of the stored value.
+fn rescaled_type(stored: ScalarType) -> ScalarType {
+    match stored {
+        ScalarType::U32 | ScalarType::I32 | ScalarType::F64 => ScalarType::F64,
+        _ => ScalarType::F32,
     }
 }
 
-fn target_type(stored: &Voxels, rescales: &[Rescale], n_per_slice: usize) -> ScalarType {
-    let is_integral = |r: &Rescale| r.slope.fract() == 0.0 && r.intercept.fract() == 0.0;
-    if !rescales.iter().all(is_integral) {
-        return rescaled_type(stored.scalar_type());
-    }
+/// The stored type if all values fit it, else the first integer type that they fit, else f64.
+fn integral_type(stored: &Voxels, rescales: &[Rescale], n_per_slice: usize) -> ScalarType {
     let range = with_voxels!(stored, v => rescaled_range(v, rescales, n_per_slice));
     let integers = [ScalarType::I16, ScalarType::U16, ScalarType::I32, ScalarType::U32];
     let mut candidates = std::iter::once(stored.scalar_type()).chain(integers);
@@ -143,7 +187,7 @@ fn target_type(stored: &Voxels, rescales: &[Rescale], n_per_slice: usize) -> Sca
 fn rescaled_range<T: Scalar>(values: &[T], rescales: &[Rescale], n_per_slice: usize) -> ValueRange {
     let mut range = ValueRange { min: f64::INFINITY, max: f64::NEG_INFINITY };
     for (slice, rescale) in values.chunks(n_per_slice).zip(rescales) {
-        for value in slice.iter().map(|v| rescale.apply(v.to_f64())) {
+        for value in slice.iter().map(|v| rescale.value(v.to_f64())) {
             range = ValueRange { min: range.min.min(value), max: range.max.max(value) };
         }
     }
@@ -167,7 +211,7 @@ fn apply<T: Scalar>(stored: &Voxels, rescales: &[Rescale], n_per_slice: usize) -
     let mut values = with_room::<T>(stored.len())?;
     with_voxels!(stored, v => {
         for (slice, rescale) in v.chunks(n_per_slice).zip(rescales) {
-            values.extend(slice.iter().map(|x| T::from_f64(rescale.apply(x.to_f64()))));
+            values.extend(slice.iter().map(|x| T::from_f64(rescale.value(x.to_f64()))));
         }
     });
     Ok(T::wrap(values))

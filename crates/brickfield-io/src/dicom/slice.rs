@@ -1,192 +1,118 @@
-//! One file's statements about its slice.
+//! One slice: a frame of a file, or a tile of one; where it lies, and what its values mean.
 
-use std::io::{Read, SeekFrom};
+use std::rc::Rc;
 
-use brickfield_core::ScalarType;
 use brickfield_core::glam::DVec3;
-use dicom_dictionary_std::tags;
-use dicom_object::file::ReadPreamble;
-use dicom_object::{DefaultDicomObject, OpenFileOptions, Tag};
 
-use super::elements::{Syntax, check_lengths, read_transfer_syntax};
-use crate::files::{ByteSource, DataFiles, n_bytes_left, open_named, read_head};
-use crate::rescale::Rescale;
-use crate::{Format, ReadError};
+use super::elements::DataSet;
+use super::frames::slices_of;
+use super::image::{Image, series};
+use super::source::open_data_set;
+use super::tags::{self, Tag};
+use crate::rescale::StatedRescale;
+use crate::{DataFiles, Limits, ReadError};
 
 #[derive(Clone, Debug)]
 pub(super) struct Slice {
-    pub(super) name: String,
-    pub(super) series: String,
-    pub(super) instance: f64,
+    pub(super) image: Rc<Image>,
+    pub(super) frame: u32,
+    /// The first column and row of the slice within its frame.
+    pub(super) corner: [u64; 2],
     pub(super) columns: u64,
     pub(super) rows: u64,
-    /// The type that BitsAllocated and PixelRepresentation give.
-    pub(super) scalar: ScalarType,
-    pub(super) bits: Bits,
-    pub(super) low_is_bright: bool,
+    pub(super) instance: f64,
     pub(super) position: Option<DVec3>,
+    /// Where [`position`](Self::position) comes from, if it is not the slice's own.
+    pub(super) step_from: Option<StepFrom>,
     /// Directions of increasing column and row number.
     pub(super) orientation: Option<[DVec3; 2]>,
     /// World units between columns and between rows.
     pub(super) pixel_spacing: Option<[f64; 2]>,
+    pub(super) location: Option<f64>,
     /// The step to the next slice as the file states it, for want of positions.
-    pub(super) stated_step: Option<f64>,
-    pub(super) rescale: Rescale,
+    pub(super) stated_step: Option<StatedStep>,
+    pub(super) rescale: StatedRescale,
+    /// The frame's numbers along dimensions that are none of space: time, echo, diffusion.
+    pub(super) phase: Vec<i64>,
+    /// The segment of a segmentation.
+    pub(super) segment: Option<u32>,
+    pub(super) stack: Option<String>,
 }
 
-/// Which bits of a stored word are the sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Bits {
-    pub(super) n_allocated: u32,
-    pub(super) n_stored: u32,
-    pub(super) high: u32,
+/// The step between slices, and the element that states it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct StatedStep {
+    pub(super) length: f64,
+    pub(super) from: StepFrom,
 }
 
-impl Slice {
-    pub(super) fn read(name: &str, files: &dyn DataFiles) -> Result<Slice, ReadError> {
-        let mut source = open_named(files, name)?;
-        let object = read_object(&mut *source, ReadExtent::BeforePixels)?;
-        let attributes = Attributes { object: &object };
-        attributes.check_supported()?;
-        let bits = attributes.bits()?;
-        Ok(Slice {
-            name: name.to_owned(),
-            series: attributes.text(tags::SERIES_INSTANCE_UID).unwrap_or_default(),
-            instance: attributes.number(tags::INSTANCE_NUMBER).unwrap_or(0.0),
-            columns: attributes.required(tags::COLUMNS, "Columns")? as u64,
-            rows: attributes.required(tags::ROWS, "Rows")? as u64,
-            scalar: attributes.scalar(bits.n_allocated),
-            bits,
-            low_is_bright: attributes.text(tags::PHOTOMETRIC_INTERPRETATION).as_deref() == Some("MONOCHROME1"),
-            position: attributes.numbers(tags::IMAGE_POSITION_PATIENT).map(DVec3::from),
-            orientation: attributes.orientation(),
-            pixel_spacing: attributes.pixel_spacing(),
-            stated_step: attributes
-                .number(tags::SPACING_BETWEEN_SLICES)
-                .or(attributes.number(tags::SLICE_THICKNESS))
-                .filter(|step| *step > 0.0),
-            rescale: Rescale {
-                slope: attributes.number(tags::RESCALE_SLOPE).unwrap_or(1.0),
-                intercept: attributes.number(tags::RESCALE_INTERCEPT).unwrap_or(0.0),
-            },
-        })
-    }
+/// The name of the element that a step comes from.
+pub(super) type StepFrom = &'static str;
+pub(super) const SPACING_BETWEEN_SLICES: StepFrom = "SpacingBetweenSlices";
+pub(super) const SLICE_THICKNESS: StepFrom = "SliceThickness";
 
-    pub(super) fn n_samples(&self) -> usize {
-        (self.columns * self.rows) as usize
+/// A file that gave no slices.
+pub(super) struct Unread {
+    pub(super) name: String,
+    /// The series it is of, if that much could be read.
+    pub(super) series: Option<String>,
+    pub(super) fault: ReadError,
+}
+
+impl Unread {
+    /// The fault with the name of the file.
+    pub(super) fn into_fault(self) -> ReadError {
+        ReadError::decoder(format!("slice {:?}", self.name), self.fault)
     }
 }
 
-/// How much of a data set is read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ReadExtent {
-    BeforePixels,
-    WithPixels,
+/// The slices of a file; none of an index (DICOMDIR).
+pub(super) fn read_slices(name: &str, files: &dyn DataFiles, limits: &Limits) -> Result<Vec<Slice>, Unread> {
+    let unread = |series, fault| Unread { name: name.to_owned(), series, fault };
+    let mut data_set = open_data_set(name, files, limits).map_err(|fault| unread(None, fault))?;
+    let (parsed, outcome) = data_set.parse();
+    let elements = parsed.elements;
+    if elements.has(tags::DIRECTORY_RECORDS) {
+        return Ok(Vec::new());
+    }
+    let slices = outcome
+        .and_then(|()| Image::new(name, &elements, parsed.pixels, data_set.codec))
+        .and_then(|image| slices_of(Rc::new(image), &elements));
+    slices.map_err(|fault| unread(Some(series(&elements)).filter(|uid| !uid.is_empty()), fault))
 }
 
-/// Parses a file, once all its lengths are known to lie within it.
-pub(super) fn read_object(source: &mut dyn ByteSource, part: ReadExtent) -> Result<DefaultDicomObject, ReadError> {
-    if n_bytes_left(source)? == 0 {
-        return Err(ReadError::Empty);
-    }
-    let head = read_head(source, 132)?;
-    if head.get(128..) != Some(b"DICM") {
-        return Err(ReadError::wrong_start(Format::Dicom, &head, "128 bytes of any kind, then DICM"));
-    }
-    let syntax = known_syntax(&read_transfer_syntax(source)?)?;
-    let end = check_lengths(source, syntax)?;
-    source.seek(SeekFrom::Start(0)).map_err(|e| ReadError::io("the data set", e))?;
-    let options = OpenFileOptions::new().read_preamble(ReadPreamble::Always);
-    let options = match part {
-        ReadExtent::BeforePixels => options.read_until(tags::PIXEL_DATA),
-        ReadExtent::WithPixels => options.read_to(tags::PIXEL_DATA),
-    };
-    options.from_reader(source.take(end)).map_err(|e| ReadError::decoder("the data set", e))
+/// The elements that speak of one frame: its own functional groups, the shared ones, the file's.
+#[derive(Clone, Copy)]
+pub(super) struct Scopes<'a> {
+    pub(super) frame: Option<&'a DataSet>,
+    pub(super) shared: Option<&'a DataSet>,
+    pub(super) file: &'a DataSet,
 }
 
-fn known_syntax(uid: &str) -> Result<Syntax, ReadError> {
-    let supported = "uncompressed, RLE, JPEG baseline and JPEG lossless are";
-    match uid.strip_prefix("1.2.840.10008.1.2") {
-        Some("") => Ok(Syntax::Implicit),
-        Some(".1") => Ok(Syntax::ExplicitLittle),
-        Some(".2") => Ok(Syntax::ExplicitBig),
-        // JPEG baseline, extended, lossless, lossless first-order; RLE.
-        Some(".4.50" | ".4.51" | ".4.57" | ".4.70" | ".5") => Ok(Syntax::ExplicitLittle),
-        _ => Err(ReadError::unsupported("transfer syntax", uid, supported)),
-    }
-}
-
-struct Attributes<'a> {
-    object: &'a DefaultDicomObject,
-}
-
-impl Attributes<'_> {
-    fn text(&self, tag: Tag) -> Option<String> {
-        let text = self.object.get(tag)?.to_str().ok()?.into_owned();
-        Some(text.trim_end_matches(['\0', ' ']).to_owned())
+impl<'a> Scopes<'a> {
+    /// The innermost data set that has an element, which functional groups hold in the sequence `group`.
+    fn holder(&self, group: Tag, tag: Tag) -> Option<&'a DataSet> {
+        let of_groups = |groups: Option<&'a DataSet>| groups?.items(group).first().filter(|item| item.has(tag));
+        let of_file = || Some(self.file).filter(|file| file.has(tag));
+        // Nuclear medicine has positions and orientations for each detector.
+        let of_detector = || self.file.items(tags::DETECTOR_INFORMATION).first().filter(|item| item.has(tag));
+        of_groups(self.frame).or_else(|| of_groups(self.shared)).or_else(of_file).or_else(of_detector)
     }
 
-    /// A finite number.
-    fn number(&self, tag: Tag) -> Option<f64> {
-        let number = self.object.get(tag)?.to_multi_float64().ok()?.first().copied()?;
-        number.is_finite().then_some(number)
+    fn number(&self, group: Tag, tag: Tag) -> Option<f64> {
+        self.holder(group, tag)?.number(tag)
     }
 
-    /// So many finite numbers.
-    fn numbers<const N: usize>(&self, tag: Tag) -> Option<[f64; N]> {
-        let numbers = self.object.get(tag)?.to_multi_float64().ok()?;
-        let numbers: [f64; N] = numbers.try_into().ok()?;
-        numbers.iter().all(|n| n.is_finite()).then_some(numbers)
+    fn numbers<const N: usize>(&self, group: Tag, tag: Tag) -> Option<[f64; N]> {
+        self.holder(group, tag)?.numbers(tag)
     }
 
-    fn required(&self, tag: Tag, field: &'static str) -> Result<f64, ReadError> {
-        let number = self.number(tag).ok_or(ReadError::Missing { field })?;
-        match (1.0..=65535.0).contains(&number) {
-            true => Ok(number),
-            false => Err(ReadError::field(field, number, "1 to 65535")),
-        }
-    }
-
-    fn check_supported(&self) -> Result<(), ReadError> {
-        let n_samples = self.number(tags::SAMPLES_PER_PIXEL).unwrap_or(1.0);
-        if n_samples != 1.0 {
-            return Err(ReadError::unsupported("SamplesPerPixel", n_samples, "1 is"));
-        }
-        let n_frames = self.number(tags::NUMBER_OF_FRAMES).unwrap_or(1.0);
-        if n_frames > 1.0 {
-            return Err(ReadError::unsupported("NumberOfFrames", n_frames, "1 is (one slice a file)"));
-        }
-        Ok(())
-    }
-
-    fn bits(&self) -> Result<Bits, ReadError> {
-        let n_allocated = self.required(tags::BITS_ALLOCATED, "BitsAllocated")? as u32;
-        if !matches!(n_allocated, 8 | 16 | 32) {
-            return Err(ReadError::unsupported("BitsAllocated", n_allocated, "8, 16 and 32 are"));
-        }
-        let n_stored = self.number(tags::BITS_STORED).map_or(n_allocated, |n| n as u32);
-        let high = self.number(tags::HIGH_BIT).map_or(n_stored.saturating_sub(1), |n| n as u32);
-        if !(1..=n_allocated).contains(&n_stored) || !(n_stored - 1..n_allocated).contains(&high) {
-            let value = format!("{n_stored} with HighBit {high}");
-            return Err(ReadError::field("BitsStored", value, format!("to lie within {n_allocated} bits")));
-        }
-        Ok(Bits { n_allocated, n_stored, high })
-    }
-
-    fn scalar(&self, n_allocated: u32) -> ScalarType {
-        let is_signed = self.number(tags::PIXEL_REPRESENTATION) == Some(1.0);
-        match (n_allocated, is_signed) {
-            (8, false) => ScalarType::U8,
-            (8, true) => ScalarType::I8,
-            (16, false) => ScalarType::U16,
-            (16, true) => ScalarType::I16,
-            (_, false) => ScalarType::U32,
-            (_, true) => ScalarType::I32,
-        }
+    pub(super) fn position(&self) -> Option<DVec3> {
+        self.numbers(tags::PLANE_POSITION, tags::IMAGE_POSITION).map(DVec3::from)
     }
 
     fn orientation(&self) -> Option<[DVec3; 2]> {
-        let [a, b, c, d, e, f] = self.numbers(tags::IMAGE_ORIENTATION_PATIENT)?;
+        let [a, b, c, d, e, f] = self.numbers(tags::PLANE_ORIENTATION, tags::IMAGE_ORIENTATION)?;
         let (along_row, along_column) = (DVec3::new(a, b, c), DVec3::new(d, e, f));
         let usable = along_row.normalize_or_zero().cross(along_column.normalize_or_zero()).length() > 1e-3;
         usable.then(|| [along_row.normalize(), along_column.normalize()])
@@ -194,8 +120,94 @@ impl Attributes<'_> {
 
     /// PixelSpacing gives the step between rows first.
     fn pixel_spacing(&self) -> Option<[f64; 2]> {
-        let spacing = self.numbers(tags::PIXEL_SPACING).or_else(|| self.numbers(tags::IMAGER_PIXEL_SPACING));
-        let [between_rows, between_columns] = spacing?;
+        let spacing = self.numbers(tags::PIXEL_MEASURES, tags::PIXEL_SPACING);
+        let [between_rows, between_columns] = spacing.or_else(|| self.file.numbers(tags::IMAGER_PIXEL_SPACING))?;
         (between_rows > 0.0 && between_columns > 0.0).then_some([between_columns, between_rows])
+    }
+
+    /// Some writers state a negative step; 0 says nothing.
+    fn stated_step(&self) -> Option<StatedStep> {
+        let spacing = self.number(tags::PIXEL_MEASURES, tags::SPACING_BETWEEN_SLICES).filter(|s| *s != 0.0);
+        let thickness = self.number(tags::PIXEL_MEASURES, tags::SLICE_THICKNESS).filter(|t| *t > 0.0);
+        let spacing = spacing.map(|s| StatedStep { length: s.abs(), from: SPACING_BETWEEN_SLICES });
+        spacing.or_else(|| thickness.map(|length| StatedStep { length, from: SLICE_THICKNESS }))
+    }
+
+    /// A dose grid has a factor instead of a slope.
+    fn rescale(&self) -> StatedRescale {
+        let slope = self.number(tags::PIXEL_VALUE_TRANSFORMATION, tags::RESCALE_SLOPE);
+        let intercept = self.number(tags::PIXEL_VALUE_TRANSFORMATION, tags::RESCALE_INTERCEPT);
+        StatedRescale {
+            slope: slope.or_else(|| self.file.number(tags::DOSE_GRID_SCALING)).unwrap_or(1.0),
+            intercept: intercept.unwrap_or(0.0),
+        }
+    }
+
+    fn segment(&self) -> Option<u32> {
+        self.number(tags::SEGMENT_IDENTIFICATION, tags::REFERENCED_SEGMENT_NUMBER).map(|n| n as u32)
+    }
+
+    fn stack(&self) -> Option<String> {
+        self.frame?.items(tags::FRAME_CONTENT).first()?.text(tags::STACK_ID)
+    }
+
+    /// The numbers along the dimensions that are none of space, else the position in time and the echo.
+    fn phase(&self) -> Vec<i64> {
+        let content = self.frame.and_then(|frame| frame.items(tags::FRAME_CONTENT).first());
+        let values = content.map(|c| c.all_numbers(tags::DIMENSION_INDEX_VALUES)).unwrap_or_default();
+        let dimensions = self.file.items(tags::DIMENSION_INDICES);
+        if !values.is_empty() && values.len() == dimensions.len() {
+            let of_other_kind = |dimension: &DataSet| !is_spatial(dimension);
+            let numbered = dimensions.iter().zip(&values).filter(|(dimension, _)| of_other_kind(dimension));
+            return numbered.map(|(_, value)| *value as i64).collect();
+        }
+        let time = content.and_then(|c| c.number(tags::TEMPORAL_POSITION_INDEX));
+        let time = time.or_else(|| self.file.number(tags::TEMPORAL_POSITION));
+        [time, self.file.number(tags::ECHO_NUMBERS)].map(|n| n.unwrap_or(0.0) as i64).to_vec()
+    }
+
+    pub(super) fn slice(&self, image: &Rc<Image>, frame: u32) -> Slice {
+        Slice {
+            image: image.clone(),
+            frame,
+            corner: [0, 0],
+            columns: image.columns,
+            rows: image.rows,
+            instance: self.file.number(tags::INSTANCE_NUMBER).unwrap_or(0.0),
+            position: self.position(),
+            step_from: None,
+            orientation: self.orientation(),
+            pixel_spacing: self.pixel_spacing(),
+            location: self.file.number(tags::SLICE_LOCATION).filter(|_| image.n_frames == 1),
+            stated_step: self.stated_step(),
+            rescale: self.rescale(),
+            phase: self.phase(),
+            segment: self.segment(),
+            stack: self.stack(),
+        }
+    }
+}
+
+/// Whether a dimension counts positions, stacks or segments, which have fields of their own.
+fn is_spatial(dimension: &DataSet) -> bool {
+    let [group, element] = dimension.numbers(tags::DIMENSION_INDEX_POINTER).unwrap_or([0.0; 2]);
+    matches!(
+        (group as u16, element as u16),
+        tags::IN_STACK_POSITION
+            | tags::IMAGE_POSITION
+            | tags::IMAGE_POSITION_VOLUME
+            | tags::STACK_ID
+            | tags::REFERENCED_SEGMENT_NUMBER
+    )
+}
+
+impl Slice {
+    pub(super) fn n_samples(&self) -> usize {
+        (self.columns * self.rows) as usize
+    }
+
+    pub(super) fn normal(&self) -> Option<DVec3> {
+        let [along_row, along_column] = self.orientation?;
+        Some(along_row.cross(along_column).normalize())
     }
 }

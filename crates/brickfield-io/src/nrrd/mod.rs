@@ -7,7 +7,7 @@ mod header;
 mod space;
 mod write;
 
-pub use write::{NrrdEncoding, save, write};
+pub use write::{save, write};
 
 use std::io::{BufRead, Seek};
 
@@ -17,7 +17,7 @@ use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
 use crate::samples::allocate;
 use crate::stored::DataFile;
-use crate::{DataFiles, Format, Limits, Opened, ReadError};
+use crate::{DataFiles, Format, OpenOptions, Opened, ReadError};
 use header::NrrdHeader;
 use space::Space;
 
@@ -28,17 +28,17 @@ use space::Space;
 ///
 /// # Errors
 /// As [`ReadError`] lists them: a header that is wrong, unsupported or beyond the limits; data that are missing.
-pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, limits: &Limits) -> Result<Opened, ReadError> {
-    read_from(&mut input, files, limits)
+pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
+    read_from(&mut input, files, options)
 }
 
-fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, limits: &Limits) -> Result<Opened, ReadError> {
+fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
     let header = NrrdHeader::read(source)?;
     let scalar = header.scalar()?;
     let stored = header.stored(scalar)?;
-    let mut found = FileFacts::plain(Format::Nrrd);
+    let mut found = FileFacts::plain(Format::Nrrd, options);
     let space = Space::of(&header, &mut found.notes)?;
-    let shape = CheckedShape::claim(space.dims, scalar, limits)?;
+    let shape = CheckedShape::claim(space.dims, scalar, &options.limits)?;
     let grid = space.placement.grid(shape.dims)?;
     let voxels = match header.file_names()? {
         Some(names) => read_detached(&names, header.n_samples(), &shape, &stored, files, &mut found.notes)?,

@@ -4,66 +4,58 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use brickfield_core::glam::DVec3;
-use brickfield_core::{ScalarType, Volume};
+use brickfield_core::{Grid, ScalarType, Volume};
 
-use crate::save::{SaveError, save_atomically, write_samples};
-use crate::{ByteOrder, WorldFrame};
-
-/// How the samples of an NRRD are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum NrrdEncoding {
-    /// As they are, little-endian.
-    Raw,
-    /// Compressed, little-endian.
-    #[cfg(feature = "gzip")]
-    Gzip,
-}
+use crate::save::{save_atomically, values, write_samples};
+use crate::{ByteOrder, Compression, SaveError, SaveOptions, WorldFrame};
 
 /// Saves a volume as attached NRRD (`.nrrd`): whole or not at all, for the file is renamed into place.
 ///
 /// # Errors
 /// If the folder cannot be written to.
-pub fn save(path: &Path, volume: &Volume, frame: WorldFrame, encoding: NrrdEncoding) -> Result<(), SaveError> {
-    save_atomically(path, |out| write(out, volume, frame, encoding))
+pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<(), SaveError> {
+    save_atomically(path, |out| write(out, volume, options))
 }
 
-/// Writes a volume as attached NRRD.
+/// Writes a volume as attached NRRD, little-endian.
 ///
 /// # Errors
 /// The errors of `out`.
-pub fn write(mut out: impl Write, volume: &Volume, frame: WorldFrame, encoding: NrrdEncoding) -> io::Result<()> {
-    out.write_all(header(volume, frame, encoding).as_bytes())?;
-    match encoding {
-        NrrdEncoding::Raw => write_samples(&mut out, volume.voxels(), ByteOrder::Little),
+pub fn write(mut out: impl Write, volume: &Volume, options: &SaveOptions) -> io::Result<()> {
+    let voxels = values(volume);
+    let mut write_header =
+        |encoding: &str| out.write_all(header(volume.grid(), voxels.scalar_type(), options, encoding).as_bytes());
+    match options.compression {
         #[cfg(feature = "gzip")]
-        NrrdEncoding::Gzip => {
+        Compression::Lossless => {
+            write_header("gzip")?;
             let mut gz = flate2::write::GzEncoder::new(out, flate2::Compression::default());
-            write_samples(&mut gz, volume.voxels(), ByteOrder::Little)?;
+            write_samples(&mut gz, &voxels, ByteOrder::Little)?;
             gz.finish()?.flush()
+        }
+        _ => {
+            write_header("raw")?;
+            write_samples(&mut out, &voxels, ByteOrder::Little)
         }
     }
 }
 
-fn header(volume: &Volume, frame: WorldFrame, encoding: NrrdEncoding) -> String {
-    let grid = volume.grid();
+fn header(grid: &Grid, scalar: ScalarType, options: &SaveOptions, encoding: &str) -> String {
     let dims = grid.dims();
     let map = grid.index_to_world();
     let steps = map.matrix3;
     let first_sample = map.transform_point3(DVec3::splat(0.5));
-    let space = match frame {
-        WorldFrame::Lps => "space: left-posterior-superior",
-        WorldFrame::Pictures | WorldFrame::Plain => "space dimension: 3",
+    let mut space = match options.frame {
+        WorldFrame::Lps => "space: left-posterior-superior".to_owned(),
+        WorldFrame::Pictures | WorldFrame::Plain => "space dimension: 3".to_owned(),
     };
-    let encoding = match encoding {
-        NrrdEncoding::Raw => "raw",
-        #[cfg(feature = "gzip")]
-        NrrdEncoding::Gzip => "gzip",
-    };
+    if let Some(unit) = options.unit.as_deref().filter(|unit| !unit.contains(['"', '\n', '\r'])) {
+        space += &format!("\nspace units: \"{unit}\" \"{unit}\" \"{unit}\"");
+    }
     format!(
         "NRRD0004\ntype: {}\ndimension: 3\n{space}\nsizes: {} {} {}\nspace directions: {} {} {}\n\
          kinds: domain domain domain\nendian: little\nencoding: {encoding}\nspace origin: {}\n\n",
-        type_name(volume.scalar_type()),
+        type_name(scalar),
         dims.x,
         dims.y,
         dims.z,

@@ -5,9 +5,11 @@ use serde_json::Value;
 use zarrs::storage::ReadableStorage;
 
 use super::json::read_json;
+use crate::choice::Entries;
 use crate::error::counted;
+use crate::opened::FileFacts;
 use crate::placement::GridPlacement;
-use crate::{Note, ReadError};
+use crate::{ChoiceKind, Note, ReadError};
 
 /// The finest level of one image.
 pub(super) struct ZarrImage {
@@ -28,12 +30,10 @@ struct Axis {
 pub(super) type VolumeAxes = [Option<usize>; 3];
 
 impl ZarrImage {
-    pub(super) fn read(store: &ReadableStorage, notes: &mut Vec<Note>) -> Result<ZarrImage, ReadError> {
+    pub(super) fn read(store: &ReadableStorage, found: &mut FileFacts) -> Result<ZarrImage, ReadError> {
         let (prefix, multiscales) = find_multiscales(store)?;
-        if multiscales.len() > 1 {
-            notes.push(Note::SeveralArrays { kept: "the first image".to_owned(), n_arrays: multiscales.len() });
-        }
-        let multiscale = &multiscales[0];
+        let names = multiscales.iter().map(|m| m["name"].as_str().unwrap_or_default().to_owned()).collect();
+        let multiscale = &multiscales[found.choose(ChoiceKind::Image, Entries::Named(names))? as usize];
         let dataset = &multiscale["datasets"][0];
         let path = dataset["path"].as_str().ok_or(ReadError::Missing { field: "multiscales/datasets/path" })?;
         check_path(path)?;

@@ -8,6 +8,9 @@ mod chunks;
 mod image;
 mod json;
 mod metadata;
+mod write;
+
+pub use write::save;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,7 +23,7 @@ use zarrs::storage::{ReadableStorage, StoreKey, WritableStorageTraits};
 use crate::guard::guarded;
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
-use crate::{Format, Limits, Opened, ReadError};
+use crate::{Format, OpenOptions, Opened, ReadError};
 use image::ZarrImage;
 use metadata::ArrayMetadata;
 
@@ -31,33 +34,33 @@ use metadata::ArrayMetadata;
 ///
 /// # Errors
 /// As [`ReadError`] lists them: metadata that are wrong, unsupported or beyond the limits; chunks that cannot be decoded.
-pub fn read(folder: &Path, limits: &Limits) -> Result<Opened, ReadError> {
+pub fn read(folder: &Path, options: &OpenOptions) -> Result<Opened, ReadError> {
     let store = FilesystemStore::new(folder).map_err(|e| ReadError::decoder("the folder", e))?;
-    read_store(Arc::new(store), limits)
+    read_store(Arc::new(store), options)
 }
 
 /// Reads an OME-Zarr whose files are in memory, by their names relative to the folder.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_entries(entries: &BTreeMap<String, Vec<u8>>, limits: &Limits) -> Result<Opened, ReadError> {
+pub fn read_entries(entries: &BTreeMap<String, Vec<u8>>, options: &OpenOptions) -> Result<Opened, ReadError> {
     let store = MemoryStore::new();
     for (name, bytes) in entries {
         let key = StoreKey::new(name.as_str()).map_err(|e| ReadError::decoder("an entry", e))?;
         store.set(&key, bytes.clone().into()).map_err(|e| ReadError::decoder("an entry", e))?;
     }
-    read_store(Arc::new(store), limits)
+    read_store(Arc::new(store), options)
 }
 
-fn read_store(store: ReadableStorage, limits: &Limits) -> Result<Opened, ReadError> {
-    let mut found = FileFacts::pictures(Format::OmeZarr);
-    let image = ZarrImage::read(&store, &mut found.notes)?;
+fn read_store(store: ReadableStorage, options: &OpenOptions) -> Result<Opened, ReadError> {
+    let mut found = FileFacts::pictures(Format::OmeZarr, options);
+    let image = ZarrImage::read(&store, &mut found)?;
     let array = ArrayMetadata::read(&store, &image.path)?;
     let volume_axes = image.volume_axes(&array.shape, &mut found.notes)?;
     let dims = volume_axes.map(|axis| axis.map_or(1, |axis| array.shape[axis]));
-    let shape = CheckedShape::claim(dims, array.scalar, limits)?;
+    let shape = CheckedShape::claim(dims, array.scalar, &options.limits)?;
     let grid = image.placement(volume_axes).grid(shape.dims)?;
-    array.check_chunks(limits)?;
+    array.check_chunks(&options.limits)?;
     let (voxels, note) = guarded("Zarr", || chunks::read(&store, &image.path, &array, volume_axes, &shape))?;
     found.notes.extend(note);
     found.unit = image.unit(volume_axes);

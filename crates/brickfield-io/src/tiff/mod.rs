@@ -1,264 +1,169 @@
-//! TIFF and BigTIFF stacks: each page a slice. Pages by the `tiff` crate.
+//! TIFF and BigTIFF stacks: each page a slice, or several where it has a depth.
 //!
-//! Spacing from the description that ImageJ or OME-TIFF write; without one it is 1, for the resolution tags of other
-//! writers are about paper. Of several channels and frames the first is read. Not: colours, palettes, packed bits.
+//! Which page is which slice, and the spacing, come from the description that ImageJ or OME-TIFF write; without one the
+//! pages are in order and the spacing is 1, for the resolution tags of other writers are about paper. Strips and tiles
+//! are decoded here, with decompressors from crates. Not: samples of 64-bit integers and 16-bit floats, fax, JPEG 2000.
 
-mod description;
-mod fault;
-mod tags;
+mod chunks;
+mod directory;
+mod files;
+mod imagej;
+mod ome;
+mod page;
+mod predict;
+mod slice;
+mod stack;
+mod unpack;
 
-use std::io::{BufRead, Seek, SeekFrom};
+use std::io::{BufRead, Seek};
 
-use ::tiff::ColorType;
-use ::tiff::decoder::{Decoder, DecodingResult, Limits as TiffLimits};
-use ::tiff::tags::{SampleFormat, Tag};
 use brickfield_core::glam::DVec3;
-use brickfield_core::{ScalarType, Voxels};
+use brickfield_core::{Scalar, Voxels, with_voxels};
 
-use crate::files::{ByteSource, n_bytes_left, read_head};
-use crate::format::is_tiff;
+use crate::choice::Entries;
+use crate::files::{ByteSource, DataFiles};
 use crate::guard::guarded;
-use crate::limits::{CheckedShape, check_bytes};
+use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
+use crate::pictures::{KeptSamples, PictureShape, PixelPart};
 use crate::placement::GridPlacement;
 use crate::samples::allocate;
-use crate::{Format, Limits, Note, Opened, ReadError};
-use description::ImageDescription;
-use fault::PageNames;
-use tags::check_tags;
+use crate::{ChoiceKind, Format, Limits, Note, OpenOptions, Opened, ReadError};
+use files::{OneFile, Plane, SUB_IFDS, StackFiles};
+use page::Page;
+pub(crate) use slice::{TiffSlice, names_other_files};
+use stack::Stack;
 
-/// Reads a TIFF stack; the outer corner of the first voxel is the world's origin.
+/// Reads a TIFF stack; the outer corner of the first voxel is the world's origin. `files` are those that OME-XML may name.
 ///
 /// # Errors
 /// As [`ReadError`] lists them: pages that are wrong, unsupported, unlike each other or beyond the limits.
-pub fn read(mut input: impl BufRead + Seek, limits: &Limits) -> Result<Opened, ReadError> {
-    guarded("TIFF", || read_from(&mut input, limits))
+pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
+    guarded("TIFF", || read_from(&mut input, files, options))
 }
 
-type PageDecoder<'a> = Decoder<&'a mut dyn ByteSource>;
-
-fn read_from(source: &mut dyn ByteSource, limits: &Limits) -> Result<Opened, ReadError> {
-    source.seek(SeekFrom::Start(0)).map_err(|e| ReadError::io("the file", e))?;
-    let n_file_bytes = n_bytes_left(source)?;
-    if n_file_bytes == 0 {
-        return Err(ReadError::Empty);
-    }
-    let head = read_head(source, 16)?;
-    if !is_tiff(&head) {
-        return Err(ReadError::wrong_start(Format::Tiff, &head, "II or MM, then 42 or 43"));
-    }
-    let mut names = PageNames { n_file_bytes, n_pages: None };
-    check_tags(source, &names)?;
-    let mut decoder = Decoder::new(source).map_err(|e| names.tags_fault(0, e))?.with_limits(header_limits());
-    let mut found = FileFacts::pictures(Format::Tiff);
-    let first = Page::read(&mut decoder, 0, &names)?;
-    let description = ImageDescription::read(&decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap_or_default());
-    let spacing = spacing(&mut decoder, &description);
-    first.check_length(n_file_bytes, limits)?;
-    names.n_pages = description.order.as_ref().map(|order| order.n_pages());
-    let pages = list_pages(&mut decoder, &first, &names)?;
-    names.n_pages = Some(pages.n_pages as u64);
-    if pages.n_reduced() > 0 {
-        found.notes.push(Note::PagesSkipped { n_pages: pages.n_reduced() });
-    }
-    let slices = slices(&pages.like_first, &description, &mut found.notes)?;
-    let dims = [first.width.into(), first.height.into(), slices.len() as u64];
-    let shape = CheckedShape::claim(dims, first.scalar, limits)?;
+fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
+    let mut found = FileFacts::pictures(Format::Tiff, options);
+    let mut files = StackFiles::new(OneFile::open(Box::new(source))?, files);
+    let stack = Stack::describe(&mut files, &mut found)?;
+    let first = stack.first_plane(&mut files)?;
+    let finest = files.with(first.file, |file| file.page(first.page, 0))?;
+    let level = choose_level(&mut files, first, &finest, &mut found)?;
+    let page = files.with(first.file, |file| file.page(first.page, level))?;
+    files.with(first.file, |file| page.check_length(file.tiff.n_bytes, &options.limits))?;
+    let part = choose_part(&stack, &page, &mut found)?;
+    let PictureShape { width, height, depth, stored, .. } = page.shape;
+    let dims = [width.into(), height.into(), stack.n_planes.saturating_mul(depth.into())];
+    let shape = CheckedShape::claim(dims, part.scalar(stored), &options.limits)?;
+    let (spacing, unit) = stack.spacing(&mut found.notes);
+    let spacing = spacing * coarsening(&finest.shape, &page.shape);
     let grid = GridPlacement::axis_aligned(spacing, 0.5 * spacing).grid(shape.dims)?;
-    let voxels = read_pages(decoder.with_limits(first.limits(limits)), &slices, &shape, &names)?;
-    found.unit = description.unit;
+    found.unit = unit;
+    let planes =
+        PlaneReader { level, part, like: page.shape, limits: options.limits, n_chunks: 0, n_missing_chunks: 0 };
+    let voxels = planes.read_all(&stack, &mut files, &shape, &mut found.notes)?;
     found.finish(grid, voxels)
 }
 
-/// Tables of strips may be long; nothing is decoded while pages are listed.
-fn header_limits() -> TiffLimits {
-    let mut limits = TiffLimits::default();
-    limits.ifd_value_size = 64 << 20;
-    limits.decoding_buffer_size = 64 << 20;
-    limits
+/// The resolution that is wanted of a pyramid, else the finest.
+fn choose_level(files: &mut StackFiles, first: Plane, finest: &Page, found: &mut FileFacts) -> Result<u64, ReadError> {
+    let reduced = files.with(first.file, |file| file.tiff.numbers(&finest.directory, SUB_IFDS))?;
+    let n_levels = 1 + reduced.map_or(0, |pages| pages.len() as u64);
+    match n_levels {
+        1 => Ok(0),
+        n => Ok(found.choices.choose(ChoiceKind::Level, Entries::Numbered(n), 0)?.entry),
+    }
 }
 
-/// The properties that must be alike in all slices.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Page {
-    width: u32,
-    height: u32,
-    scalar: ScalarType,
+fn choose_part(stack: &Stack, page: &Page, found: &mut FileFacts) -> Result<PixelPart, ReadError> {
+    if let Some(shown) = page.shown {
+        found.notes.push(Note::AsStored { shown });
+    }
+    let pixel = stack.pixel(page.shape.pixel, &mut found.notes);
+    match stack.has_channels {
+        true => Ok(pixel.default_part(&mut found.notes)),
+        false => pixel.choose(found),
+    }
 }
 
-impl Page {
-    fn read(decoder: &mut PageDecoder, page: usize, names: &PageNames) -> Result<Page, ReadError> {
-        let fault = |e| names.tags_fault(page, e);
-        let (width, height) = decoder.dimensions().map_err(fault)?;
-        let bits = match decoder.colortype().map_err(fault)? {
-            ColorType::Gray(bits) => bits,
-            other => return Err(ReadError::unsupported("colour type", format!("{other:?}"), "grey is")),
-        };
-        let format = decoder.find_tag_unsigned::<u16>(Tag::SampleFormat).map_err(fault)?;
-        let format = format.map_or(SampleFormat::Uint, SampleFormat::from_u16_exhaustive);
-        let scalar = match (format, bits) {
-            (SampleFormat::Uint, 8) => ScalarType::U8,
-            (SampleFormat::Uint, 16) => ScalarType::U16,
-            (SampleFormat::Uint, 32) => ScalarType::U32,
-            (SampleFormat::Int, 8) => ScalarType::I8,
-            (SampleFormat::Int, 16) => ScalarType::I16,
-            (SampleFormat::Int, 32) => ScalarType::I32,
-            (SampleFormat::IEEEFP, 32) => ScalarType::F32,
-            (SampleFormat::IEEEFP, 64) => ScalarType::F64,
-            _ => {
-                return Err(ReadError::unsupported(
-                    "sample type",
-                    format!("{format:?} of {bits} bits"),
-                    crate::SCALARS,
-                ));
+/// Samples of the finest level for one of a coarser one.
+fn coarsening(finest: &PictureShape, level: &PictureShape) -> DVec3 {
+    let ratio = |finest: u32, level: u32| f64::from(finest) / f64::from(level);
+    DVec3::new(ratio(finest.width, level.width), ratio(finest.height, level.height), 1.0)
+}
+
+/// Reads planes that are all alike.
+struct PlaneReader {
+    level: u64,
+    part: PixelPart,
+    like: PictureShape,
+    limits: Limits,
+    n_chunks: u64,
+    n_missing_chunks: u64,
+}
+
+impl PlaneReader {
+    fn read_all(
+        mut self,
+        stack: &Stack,
+        files: &mut StackFiles,
+        shape: &CheckedShape,
+        notes: &mut Vec<Note>,
+    ) -> Result<Voxels, ReadError> {
+        let mut voxels = None;
+        let mut n_missing = 0;
+        for i in 0..stack.n_planes {
+            match stack.plane(i, files)? {
+                Some(plane) => files.with(plane.file, |file| self.append(&mut voxels, file, plane, shape))?,
+                None => {
+                    n_missing += 1;
+                    append_zeros(made(&mut voxels, shape)?, self.like.n_pixels() as usize);
+                }
             }
-        };
-        Ok(Page { width, height, scalar })
-    }
-
-    fn n_bytes(&self) -> u128 {
-        u128::from(self.width) * u128::from(self.height) * self.scalar.n_bytes() as u128
-    }
-
-    /// A page can only be so many times larger than the file that holds it.
-    fn check_length(&self, n_file_bytes: u64, limits: &Limits) -> Result<(), ReadError> {
-        let what = || format!("a page of {} x {} samples of {}", self.width, self.height, self.scalar);
-        check_bytes(self.n_bytes(), limits, what)?;
-        if self.n_bytes() > u128::from(n_file_bytes) * MAX_RATIO {
-            let (n_compressed_bytes, expected_bytes) = (n_file_bytes, self.n_bytes());
-            return Err(ReadError::TooFewCompressed { what: what(), n_compressed_bytes, expected_bytes });
         }
-        Ok(())
-    }
-
-    /// A decoded page (the decoder holds tables of tags to the same limit), and room for strips that reach beyond it.
-    fn limits(&self, limits: &Limits) -> TiffLimits {
-        let page_bytes = self.n_bytes().min(u128::from(limits.max_bytes)) as usize;
-        let mut tiff_limits = header_limits();
-        tiff_limits.decoding_buffer_size = page_bytes.max(tiff_limits.ifd_value_size);
-        tiff_limits.intermediate_buffer_size = page_bytes.saturating_mul(2).saturating_add(1 << 20);
-        tiff_limits
-    }
-}
-
-/// More than LZW, deflate and packed bits can expand.
-const MAX_RATIO: u128 = 4096;
-
-struct PageList {
-    n_pages: usize,
-    /// Numbers from 0 of the pages that are like the first; reduced copies are left out.
-    like_first: Vec<usize>,
-}
-
-impl PageList {
-    fn n_reduced(&self) -> usize {
-        self.n_pages - self.like_first.len()
-    }
-}
-
-fn list_pages(decoder: &mut PageDecoder, first: &Page, names: &PageNames) -> Result<PageList, ReadError> {
-    let mut pages = PageList { n_pages: 1, like_first: vec![0] };
-    while decoder.more_images() {
-        let i = pages.n_pages;
-        pages.n_pages += 1;
-        let before = decoder.ifd_pointer();
-        decoder.next_image().map_err(|e| names.next_fault(i, decoder, before, e))?;
-        let subfile_type = decoder.find_tag_unsigned::<u32>(Tag::NewSubfileType);
-        if subfile_type.map_err(|e| names.tags_fault(i, e))?.unwrap_or(0) & 1 == 1 {
-            continue;
+        if n_missing > 0 {
+            notes.push(Note::MissingPlanes { n_missing, n_planes: stack.n_planes });
         }
-        let page = Page::read(decoder, i, names)?;
-        if page != *first {
-            let value = format!("{} x {} {} ({})", page.width, page.height, page.scalar, names.page(i));
-            let expected = format!("{} x {} {}, as the first page", first.width, first.height, first.scalar);
-            return Err(ReadError::field("page", value, expected));
+        if self.n_missing_chunks > 0 {
+            notes.push(Note::MissingChunks { n_missing: self.n_missing_chunks, n_chunks: self.n_chunks });
         }
-        pages.like_first.push(i);
+        voxels.ok_or(ReadError::Missing { field: "a page" })
     }
-    Ok(pages)
-}
 
-/// The pages of the first channel and frame.
-fn slices(pages: &[usize], description: &ImageDescription, notes: &mut Vec<Note>) -> Result<Vec<usize>, ReadError> {
-    let Some(order) = &description.order else { return Ok(pages.to_vec()) };
-    let n_described = order.n_pages();
-    if n_described != pages.len() as u64 {
-        let expected = format!("{n_described}, from the description");
-        return Err(ReadError::field("number of pages", pages.len(), expected));
-    }
-    for (axis, n_entries) in [("c", order.n_channels), ("t", order.n_frames)] {
-        if n_entries > 1 {
-            notes.push(Note::FirstOfAxis { axis: axis.to_owned(), n_entries });
+    fn append(
+        &mut self,
+        voxels: &mut Option<Voxels>,
+        file: &mut OneFile,
+        plane: Plane,
+        shape: &CheckedShape,
+    ) -> Result<(), ReadError> {
+        let page = file.page(plane.page, self.level)?;
+        if page.shape != self.like {
+            let value = format!("{} ({})", page.shape, page.name());
+            return Err(ReadError::field("page", value, format!("{}, as the first page", self.like)));
         }
-    }
-    let step = order.pages_per_slice as usize;
-    Ok(pages.iter().copied().step_by(step).take(order.n_slices as usize).collect())
-}
-
-fn spacing(decoder: &mut PageDecoder, description: &ImageDescription) -> DVec3 {
-    let mut per_pixel = |tag| {
-        let pixels_per_unit = resolution(decoder, tag)?;
-        description.uses_resolution.then_some(1.0 / pixels_per_unit)
-    };
-    let [x, y] = [per_pixel(Tag::XResolution), per_pixel(Tag::YResolution)];
-    let [dx, dy, dz] = description.spacing;
-    let usable = |v: &f64| v.is_finite() && *v > 0.0;
-    let or_one = |v: Option<f64>| v.filter(usable).unwrap_or(1.0);
-    DVec3::new(or_one(dx.or(x)), or_one(dy.or(y)), or_one(dz))
-}
-
-fn resolution(decoder: &mut PageDecoder, tag: Tag) -> Option<f64> {
-    use ::tiff::decoder::ifd::Value;
-    match decoder.find_tag(tag).ok()?? {
-        Value::Rational(n, d) => Some(f64::from(n) / f64::from(d)),
-        _ => None,
-    }
-}
-
-fn read_pages(
-    mut decoder: PageDecoder,
-    slices: &[usize],
-    shape: &CheckedShape,
-    names: &PageNames,
-) -> Result<Voxels, ReadError> {
-    let n_page = shape.dims.x as usize * shape.dims.y as usize;
-    let mut voxels = None;
-    for page in slices {
-        decoder.seek_to_image(*page).map_err(|e| names.tags_fault(*page, e))?;
-        let samples = decoder.read_image().map_err(|e| names.samples_fault(*page, &mut decoder, e))?;
+        let samples = chunks::read_samples(&mut file.tiff, &page, self.part.kept(), plane.shift, &self.limits)?;
+        self.n_chunks += samples.n_chunks;
+        self.n_missing_chunks += samples.n_missing;
+        let palette = page.palette(&mut file.tiff)?;
+        let (order, stored, n_pixels) = (samples.order, page.shape.stored, page.shape.n_pixels() as usize);
+        let kept = KeptSamples { bytes: &samples.bytes, order, stored, n_pixels, palette: &palette };
         // Allocated when the first page has been decoded, so that a page which cannot be costs nothing.
-        let voxels = match &mut voxels {
-            Some(voxels) => voxels,
-            None => voxels.insert(allocate(shape)?),
-        };
-        append_page(voxels, samples, n_page, &names.page(*page))?;
+        self.part.append(made(voxels, shape)?, kept, &self.limits, page.name())
     }
-    voxels.ok_or(ReadError::Missing { field: "a page" })
 }
 
-fn append_page(voxels: &mut Voxels, samples: DecodingResult, n_page: usize, page: &str) -> Result<(), ReadError> {
-    macro_rules! append {
-        ($out:expr, $samples:expr) => {{
-            let found = $samples.len();
-            if found != n_page {
-                return Err(ReadError::TooFewSamples { what: page.to_owned(), found, expected: n_page });
-            }
-            $out.extend_from_slice(&$samples);
-        }};
+/// The voxels, with room for all of them from the first use on.
+fn made<'v>(voxels: &'v mut Option<Voxels>, shape: &CheckedShape) -> Result<&'v mut Voxels, ReadError> {
+    match voxels {
+        Some(voxels) => Ok(voxels),
+        None => Ok(voxels.insert(allocate(shape)?)),
     }
-    match (voxels, samples) {
-        (Voxels::U8(out), DecodingResult::U8(s)) => append!(out, s),
-        (Voxels::I8(out), DecodingResult::I8(s)) => append!(out, s),
-        (Voxels::U16(out), DecodingResult::U16(s)) => append!(out, s),
-        (Voxels::I16(out), DecodingResult::I16(s)) => append!(out, s),
-        (Voxels::U32(out), DecodingResult::U32(s)) => append!(out, s),
-        (Voxels::I32(out), DecodingResult::I32(s)) => append!(out, s),
-        (Voxels::F32(out), DecodingResult::F32(s)) => append!(out, s),
-        (Voxels::F64(out), DecodingResult::F64(s)) => append!(out, s),
-        (voxels, _) => {
-            let expected = format!("{}, as its tags say", voxels.scalar_type());
-            return Err(ReadError::field(page, "of another sample type", expected));
-        }
+}
+
+fn append_zeros(voxels: &mut Voxels, n: usize) {
+    fn append<T: Scalar>(values: &mut Vec<T>, n: usize) {
+        values.resize(values.len() + n, T::from_f64(0.0));
     }
-    Ok(())
+    with_voxels!(voxels, v => append(v, n));
 }

@@ -12,13 +12,14 @@ use std::io::{BufRead, Read, Seek, SeekFrom};
 use brickfield_core::glam::{DMat3, DVec3};
 use brickfield_core::{ScalarType, Voxels};
 
+use crate::choice::Entries;
 use crate::error::check_length;
 use crate::files::{ByteSource, n_bytes_left};
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
 use crate::placement::GridPlacement;
 use crate::samples::{allocate, append_binary, append_text, least_text_bytes};
-use crate::{Format, Limits, Note, Opened, ReadError};
+use crate::{ChoiceKind, Format, OpenOptions, Opened, ReadError};
 use blocks::{WordReader, check_plain, read_blocks};
 use document::{Array, ArrayStorage, Document, Support};
 use inline::{Base64Reader, UntilTag};
@@ -30,23 +31,25 @@ use inline::{Base64Reader, UntilTag};
 ///
 /// # Errors
 /// As [`ReadError`] lists them: a document that is wrong, unsupported or beyond the limits; data that are missing.
-pub fn read(mut input: impl BufRead + Seek, limits: &Limits) -> Result<Opened, ReadError> {
-    read_from(&mut input, limits)
+pub fn read(mut input: impl BufRead + Seek, options: &OpenOptions) -> Result<Opened, ReadError> {
+    read_from(&mut input, options)
 }
 
-fn read_from(source: &mut dyn ByteSource, limits: &Limits) -> Result<Opened, ReadError> {
+fn read_from(source: &mut dyn ByteSource, options: &OpenOptions) -> Result<Opened, ReadError> {
     let document = Document::read(source)?;
-    let mut found = FileFacts::plain(Format::Vti);
-    let array = choose(&document, &mut found.notes)?;
+    let mut found = FileFacts::plain(Format::Vti, options);
+    let array = choose(&document, &mut found)?;
     let scalar = scalar(&array.type_name)?;
-    let shape = CheckedShape::claim(dims(&document.extent, array.support)?, scalar, limits)?;
+    let shape = CheckedShape::claim(dims(&document.extent, array.support)?, scalar, &options.limits)?;
     let grid = placement(&document, array.support).grid(shape.dims)?;
     let voxels = read_array(source, &document, array, &shape)?;
     found.finish(grid, voxels)
 }
 
-fn choose<'a>(document: &'a Document, notes: &mut Vec<Note>) -> Result<&'a Array, ReadError> {
-    let candidates = |support| document.arrays.iter().filter(move |a: &&Array| a.support == support);
+/// The array that is wanted; without a wish the active scalars, else the first array of one component.
+fn choose<'a>(document: &'a Document, found: &mut FileFacts) -> Result<&'a Array, ReadError> {
+    let arrays = &document.arrays;
+    let candidates = |support| arrays.iter().enumerate().filter(move |(_, a): &(usize, &Array)| a.support == support);
     let support = match candidates(Support::Points).next() {
         Some(_) => Support::Points,
         None => Support::Cells,
@@ -55,17 +58,15 @@ fn choose<'a>(document: &'a Document, notes: &mut Vec<Note>) -> Result<&'a Array
         Support::Points => &document.point_scalars,
         Support::Cells => &document.cell_scalars,
     };
-    let named = active.as_ref().and_then(|name| candidates(support).find(|a| a.name == *name));
-    let single = || candidates(support).find(|a| a.n_components == 1 && scalar(&a.type_name).is_ok());
-    let array = named.or_else(single).or_else(|| candidates(support).next());
-    let array = array.ok_or_else(|| document.missing("a DataArray in PointData or CellData"))?;
+    let named = active.as_ref().and_then(|name| candidates(support).find(|(_, a)| a.name == *name));
+    let single = || candidates(support).find(|(_, a)| a.n_components == 1 && scalar(&a.type_name).is_ok());
+    let preferred = named.or_else(single).or_else(|| candidates(support).next());
+    let (preferred, _) = preferred.ok_or_else(|| document.missing("a DataArray in PointData or CellData"))?;
+    let names = arrays.iter().map(|a| a.name.clone()).collect();
+    let array = &arrays[found.choose_or(ChoiceKind::Array, Entries::Named(names), preferred as u64)? as usize];
     if array.n_components != 1 {
         let value = format!("{} of array {}", array.n_components, array.name);
         return Err(ReadError::unsupported("NumberOfComponents", value, "1 is"));
-    }
-    let n_arrays = document.arrays.len();
-    if n_arrays > 1 {
-        notes.push(Note::SeveralArrays { kept: array.name.clone(), n_arrays });
     }
     Ok(array)
 }

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use brickfield_io::{Format, Limits, detect, open};
+use brickfield_io::{Format, Limits, OpenOptions, detect, open};
 
-use crate::common::LIMITS;
+use crate::common::options;
 
 pub(crate) struct BadFile {
     pub(crate) name: &'static str,
@@ -76,8 +76,8 @@ fn replaced(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
 
 /// The one-line message of a refusal, which names the file.
 #[track_caller]
-fn refusal(path: &Path, limits: &Limits) -> String {
-    let message = open(path, limits).expect_err("a refusal").to_string();
+fn refusal(path: &Path, options: &OpenOptions) -> String {
+    let message = open(path, options).expect_err("a refusal").to_string();
     assert!(message.starts_with(&path.display().to_string()), "{message}");
     assert!(!message.contains('\n') && message.len() < 500, "{message}");
     message
@@ -88,14 +88,14 @@ fn every_format() {
     let folder = tempfile::tempdir().unwrap();
     for case in cases() {
         let path = write(folder.path(), case.name, &case.good);
-        open(&path, &LIMITS).unwrap();
+        open(&path, &options()).unwrap();
         let absurd = replaced(&case.good, case.absurd.0, case.absurd.1);
-        let message = refusal(&write(folder.path(), case.name, &absurd), &Limits::default());
+        let message = refusal(&write(folder.path(), case.name, &absurd), &OpenOptions::default());
         assert!(message.contains(case.absurd.2), "{message}");
         let unsupported = replaced(&case.good, case.unsupported.0, case.unsupported.1);
-        let message = refusal(&write(folder.path(), case.name, &unsupported), &LIMITS);
+        let message = refusal(&write(folder.path(), case.name, &unsupported), &options());
         assert!(message.contains(case.unsupported.2), "{message}");
-        let message = refusal(&write(folder.path(), case.name, &case.good), &Limits { max_bytes: 11 });
+        let message = refusal(&write(folder.path(), case.name, &case.good), &Limits { max_bytes: 11 }.into());
         assert!(message.contains("the limit is 11 bytes"), "{message}");
     }
 }
@@ -106,7 +106,7 @@ fn a_file_cut_anywhere_is_refused_or_read() {
     for case in cases() {
         for n in 0..case.good.len() {
             let path = write(folder.path(), case.name, &case.good[..n]);
-            if let Err(e) = open(&path, &LIMITS) {
+            if let Err(e) = open(&path, &options()) {
                 let message = e.to_string();
                 assert!(message.starts_with(&path.display().to_string()) && !message.contains('\n'), "{message}");
             }
@@ -118,7 +118,7 @@ fn a_file_cut_anywhere_is_refused_or_read() {
 fn an_empty_file_of_every_extension() {
     let folder = tempfile::tempdir().unwrap();
     for extension in Format::ALL.iter().flat_map(|format| format.extensions()) {
-        let message = refusal(&write(folder.path(), &format!("empty.{extension}"), &[]), &LIMITS);
+        let message = refusal(&write(folder.path(), &format!("empty.{extension}"), &[]), &options());
         assert!(message.ends_with("the file is empty (0 bytes)"), "{message}");
     }
 }
@@ -128,9 +128,9 @@ fn text_in_a_file_of_every_extension() {
     let folder = tempfile::tempdir().unwrap();
     for extension in Format::ALL.iter().flat_map(|format| format.extensions()) {
         let text = b"This is not a volume.\nIt is a letter to a friend.\n".repeat(20);
-        refusal(&write(folder.path(), &format!("letter.{extension}"), &text), &LIMITS);
+        refusal(&write(folder.path(), &format!("letter.{extension}"), &text), &options());
     }
-    let message = refusal(&write(folder.path(), "letter", b"Dear friend,\n"), &LIMITS);
+    let message = refusal(&write(folder.path(), "letter", b"Dear friend,\n"), &options());
     assert!(message.ends_with("no known volume format; it starts with \"Dear friend,\\n\""), "{message}");
 }
 
@@ -142,7 +142,7 @@ fn content_goes_before_the_extension() {
         for wrong in ["v.tif", "v.nii.gz", "v.raw", "v"] {
             let path = write(folder.path(), wrong, &case.good);
             assert_eq!(detect(&path).unwrap(), right);
-            assert_eq!(open(&path, &LIMITS).unwrap().format, right);
+            assert_eq!(open(&path, &options()).unwrap().format, right);
         }
     }
 }
@@ -150,16 +150,16 @@ fn content_goes_before_the_extension() {
 #[test]
 fn foreign_formats_folders_and_missing_files() {
     let folder = tempfile::tempdir().unwrap();
-    let vdb = refusal(&write(folder.path(), "v.vdb", b" BDV\0\0\0\0"), &LIMITS);
+    let vdb = refusal(&write(folder.path(), "v.vdb", b" BDV\0\0\0\0"), &options());
     assert!(vdb.contains("format \"OpenVDB\" is not supported"), "{vdb}");
-    let raw = refusal(&write(folder.path(), "v.raw", b"\x01\x02"), &LIMITS);
+    let raw = refusal(&write(folder.path(), "v.raw", b"\x01\x02"), &options());
     assert!(raw.contains("open_raw"), "{raw}");
     std::fs::create_dir(folder.path().join("empty")).unwrap();
-    assert!(refusal(&folder.path().join("empty"), &LIMITS).contains("0 entries"));
-    assert!(refusal(&folder.path().join("gone.nrrd"), &LIMITS).contains("cannot read the file"));
+    assert!(refusal(&folder.path().join("empty"), &options()).contains("0 entries"));
+    assert!(refusal(&folder.path().join("gone.nrrd"), &options()).contains("cannot read the file"));
     #[cfg(feature = "gzip")]
     {
         let packed = write(folder.path(), "v.nrrd.gz", &crate::common::gzip(&cases()[0].good));
-        assert!(refusal(&packed, &LIMITS).contains("unpack it first"));
+        assert!(refusal(&packed, &options()).contains("unpack it first"));
     }
 }

@@ -4,13 +4,15 @@ use std::collections::BTreeMap;
 
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Scalar, ScalarType, Voxels, with_voxels};
-use brickfield_io::{ByteOrder, Limits, Opened};
+use brickfield_io::{ByteOrder, Limits, OpenOptions, Opened};
 
 pub(crate) const DIMS: UVec3 = UVec3::new(4, 3, 2);
 pub(crate) const ORDERS: [ByteOrder; 2] = [ByteOrder::Little, ByteOrder::Big];
 
 /// Enough for every fixture, and little enough that a mistake shows.
-pub(crate) const LIMITS: Limits = Limits { max_bytes: 1 << 20 };
+pub(crate) fn options() -> OpenOptions {
+    Limits { max_bytes: 1 << 20 }.into()
+}
 
 /// A different value in every voxel of [`DIMS`], negative ones where the type has them.
 pub(crate) fn ramp(scalar: ScalarType) -> Voxels {

@@ -1,8 +1,8 @@
 //! Tables over all formats of what the messages about damaged files say, to the letter.
 
-use brickfield_io::{Note, open};
+use brickfield_io::{ChoiceKind, Note, open};
 
-use crate::common::LIMITS;
+use crate::common::options;
 
 /// What the message says after the path.
 #[track_caller]
@@ -10,7 +10,7 @@ fn refusal(name: &str, bytes: &[u8]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
-    let message = open(&path, &LIMITS).expect_err("a refusal").to_string();
+    let message = open(&path, &options()).expect_err("a refusal").to_string();
     let said = message.strip_prefix(&format!("{}: ", path.display())).expect("the path comes first");
     assert!(!said.contains(['\n', '\r']), "{said}");
     said.to_owned()
@@ -71,15 +71,14 @@ fn one_is_not_many() {
     );
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("letter"), "Dear friend").unwrap();
-    let message = open(folder.path(), &LIMITS).unwrap_err().to_string();
+    let message = open(folder.path(), &options()).unwrap_err().to_string();
     assert!(message.ends_with("among the 1 entry of this folder"), "{message}");
     let skipped = |n_files| Note::FilesSkipped { n_files, first: "a".to_owned(), reason: "why".to_owned() };
-    let series = |n| Note::SeveralSeries { kept: "1.2".to_owned(), n_series: 2, n_slices_left_out: n };
+    let series = Note::OneOfSeveral { kind: ChoiceKind::Series, read: "0 (1.2)".to_owned(), n_entries: 2 };
     let notes = [
-        (skipped(1), "1 file is no slice and was skipped, \"a\": why"),
-        (skipped(2), "2 files are no slices and were skipped, first \"a\": why"),
-        (series(1), "one of 2 series was read: 1.2; 1 slice was left out"),
-        (series(2), "one of 2 series was read: 1.2; 2 slices were left out"),
+        (skipped(1), "1 file is no slice of this volume and was skipped, \"a\": why"),
+        (skipped(2), "2 files are no slices of this volume and were skipped, first \"a\": why"),
+        (series, "one of 2 series was read: 0 (1.2)"),
         (Note::DuplicateSlices { n_slices: 1 }, "1 slice lies where another does and was left out"),
         (Note::DuplicateSlices { n_slices: 2 }, "2 slices lie where another does and were left out"),
         (Note::PagesSkipped { n_pages: 1 }, "1 page of reduced resolution was skipped"),

@@ -2,11 +2,11 @@ use std::collections::BTreeMap;
 
 use brickfield_core::glam::DVec3;
 use brickfield_core::{ScalarType, Voxels};
-use brickfield_io::{Note, Opened, ReadError, WorldFrame, dicom, open};
+use brickfield_io::{ChoiceKind, Note, Opened, ReadError, WorldFrame, dicom, open};
 
-use crate::common::LIMITS;
+use crate::common::options;
 
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Syntax {
     Explicit,
     Implicit,
@@ -133,7 +133,7 @@ fn rle(bytes: &[u8], sample_bytes: usize) -> Vec<u8> {
     out
 }
 
-fn even(text: &str, pad: u8) -> Vec<u8> {
+pub(crate) fn even(text: &str, pad: u8) -> Vec<u8> {
     let mut bytes = text.as_bytes().to_vec();
     if bytes.len() % 2 == 1 {
         bytes.push(pad);
@@ -141,7 +141,7 @@ fn even(text: &str, pad: u8) -> Vec<u8> {
     bytes
 }
 
-fn element(out: &mut Vec<u8>, syntax: Syntax, (group, number): (u16, u16), vr: &[u8; 2], value: &[u8]) {
+pub(crate) fn element(out: &mut Vec<u8>, syntax: Syntax, (group, number): (u16, u16), vr: &[u8; 2], value: &[u8]) {
     let is_big = syntax == Syntax::BigEndian;
     let short = |v: u16| if is_big { v.to_be_bytes() } else { v.to_le_bytes() };
     let long = |v: u32| if is_big { v.to_be_bytes() } else { v.to_le_bytes() };
@@ -149,7 +149,7 @@ fn element(out: &mut Vec<u8>, syntax: Syntax, (group, number): (u16, u16), vr: &
     out.extend(short(number));
     match (syntax, vr) {
         (Syntax::Implicit, _) => out.extend(long(value.len() as u32)),
-        (_, b"OW") => {
+        (_, b"OW" | b"OB" | b"SQ") => {
             out.extend([vr[0], vr[1], 0, 0]);
             out.extend(long(value.len() as u32));
         }
@@ -161,11 +161,11 @@ fn element(out: &mut Vec<u8>, syntax: Syntax, (group, number): (u16, u16), vr: &
     out.extend(value);
 }
 
-fn read(slices: &[Slice]) -> Result<Opened, ReadError> {
+pub(crate) fn read(slices: &[Slice]) -> Result<Opened, ReadError> {
     let files: BTreeMap<String, Vec<u8>> =
         slices.iter().enumerate().map(|(i, s)| (format!("{i:02}.dcm"), s.bytes())).collect();
     let names: Vec<String> = files.keys().cloned().collect();
-    dicom::read(&names, &files, &LIMITS)
+    dicom::read(&names, &files, &options())
 }
 
 fn voxels(opened: &Opened) -> Vec<f64> {
@@ -248,7 +248,7 @@ fn a_damaged_slice_is_not_left_out() {
         cut.truncate(cut.len() - n_cut);
         let names = ["a", "b", "c"].map(str::to_owned);
         let files = crate::common::files([("a", first), ("b", cut), ("c", last)]);
-        let fault = dicom::read(&names, &files, &LIMITS).unwrap_err().to_string();
+        let fault = dicom::read(&names, &files, &options()).unwrap_err().to_string();
         assert!(fault.contains("slice \"b\"") && fault.contains(part), "{fault}");
     }
 }
@@ -267,20 +267,19 @@ fn duplicates_other_series_and_other_files_are_told() {
     other.series = "9.9";
     let opened = read(&[Slice::at(0.0), Slice::at(1.0), Slice::at(1.0), other]).unwrap();
     assert_eq!(opened.volume.grid().dims().z, 2);
-    let kept = "1.2.3".to_owned();
-    let series = Note::SeveralSeries { kept, n_series: 2, n_slices_left_out: 1 };
+    let series = Note::OneOfSeveral { kind: ChoiceKind::Series, read: "0 (1.2.3)".to_owned(), n_entries: 2 };
     assert_eq!(opened.notes, [series, Note::DuplicateSlices { n_slices: 1 }]);
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.dcm"), Slice::at(0.0).bytes()).unwrap();
     std::fs::write(folder.path().join("read me.txt"), "no slice").unwrap();
-    let opened = open(folder.path(), &LIMITS).unwrap();
+    let opened = open(folder.path(), &options()).unwrap();
     assert!(matches!(&opened.notes[..], [Note::FilesSkipped { n_files: 1, first, .. }] if first == "read me.txt"));
 }
 
 #[test]
 fn lengths_beyond_the_file_are_refused_before_they_are_allocated() {
     let whole = Slice::at(0.0).bytes();
-    let read = |bytes: Vec<u8>| dicom::read(&["a".to_owned()], &crate::common::files([("a", bytes)]), &LIMITS);
+    let read = |bytes: Vec<u8>| dicom::read(&["a".to_owned()], &crate::common::files([("a", bytes)]), &options());
     for n in [0, 100, 131, 140, 200, 300, whole.len() - 1] {
         let fault = read(whole[..n].to_vec()).unwrap_err().to_string();
         assert!(!fault.contains('\n'), "{fault}");
@@ -303,10 +302,12 @@ fn lengths_beyond_the_file_are_refused_before_they_are_allocated() {
     odd[at..at + 2].copy_from_slice(&3u16.to_le_bytes());
     let fault = read(odd).unwrap_err().to_string();
     assert_eq!(fault, "slice \"a\": length of element (0028,0010) is \"3\"; expected a multiple of 2");
-    // A group length that is too short would make meta elements part of the data set.
-    let mut short = whole.clone();
-    short[140..144].copy_from_slice(&[0; 4]);
-    assert_eq!(read(short).unwrap_err().to_string(), "TransferSyntaxUID is missing");
+    // The meta group ends where its elements do, whatever its length says.
+    for length in [0u32, 10_000] {
+        let mut wrong = whole.clone();
+        wrong[140..144].copy_from_slice(&length.to_le_bytes());
+        assert_eq!(read(wrong).unwrap().volume.voxels(), &Voxels::U16(vec![0; 6]));
+    }
     // Found by fuzzing: the parser goes on after the pixel data where tags are lower.
     let junk = [whole.clone(), [0; 24].to_vec(), b"\x02\0\x02\0UN\0\0\x02\0\x55\x49".to_vec()].concat();
     assert_eq!(read(junk).unwrap().volume.voxels(), &Voxels::U16(vec![0; 6]));
@@ -324,7 +325,7 @@ fn lengths_beyond_the_file_are_refused_before_they_are_allocated() {
 fn uneven_slices_become_even_on_a_tilted_grid_too() {
     let slices = [0.0, 1.0, 2.0, 5.0].map(|z| Slice { position: [10.0, 20.0 + z, z], ..Slice::at(z) });
     let opened = read(&slices).unwrap();
-    let even = opened.clone().evenly_spaced(&LIMITS);
+    let even = opened.clone().evenly_spaced(&options().limits);
     let [before, after] = [&opened, &even].map(|o| o.volume.grid());
     assert_eq!((before.dims().z, after.dims().z), (4, 6));
     // The last slice lies where the file has it; on the median's grid it did not.
@@ -348,7 +349,7 @@ fn padding_behind_a_file_is_no_damage() {
     let names = ["a", "b", "c"].map(str::to_owned);
     let [first, second] = files;
     let files = crate::common::files([("a", first), ("b", second), ("c", document)]);
-    let fault = dicom::read(&names, &files, &LIMITS).map(|o| o.volume.grid().dims().z);
+    let fault = dicom::read(&names, &files, &options()).map(|o| o.volume.grid().dims().z);
     // It has the size of a slice: that it has no pixels is told by its name.
     assert!(fault.unwrap_err().to_string().contains("slice \"c\""));
 }

@@ -5,15 +5,36 @@ mod common;
 mod damaged;
 #[cfg(feature = "dicom")]
 mod dicom;
+#[cfg(feature = "dicom")]
+mod dicom_codecs;
+#[cfg(feature = "dicom")]
+mod dicom_file;
+#[cfg(feature = "dicom")]
+mod dicom_frames;
+#[cfg(feature = "dicom")]
+mod dicom_series;
 mod metaimage;
 #[cfg(feature = "nifti")]
 mod nifti;
 mod nrrd;
 #[cfg(feature = "ome-zarr")]
 mod ome_zarr;
+#[cfg(any(feature = "tiff", feature = "png"))]
+mod pictures;
 mod raw;
+mod save;
 mod seeds;
 #[cfg(feature = "tiff")]
 mod tiff;
+#[cfg(feature = "tiff")]
+mod tiff_bytes;
+#[cfg(feature = "tiff")]
+mod tiff_colour;
+#[cfg(feature = "tiff")]
+mod tiff_imagej;
+#[cfg(feature = "tiff")]
+mod tiff_layout;
+#[cfg(feature = "tiff")]
+mod tiff_ome;
 #[cfg(feature = "vti")]
 mod vti;

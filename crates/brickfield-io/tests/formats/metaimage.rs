@@ -7,7 +7,7 @@ use brickfield_io::{ByteOrder, DataFiles, NoFiles, Note, Opened, ReadError, Worl
 use crate::common::*;
 
 fn read(header: &str, data: &[u8], files: &dyn DataFiles) -> Result<Opened, ReadError> {
-    metaimage::read(Cursor::new([header.as_bytes(), data].concat()), files, &LIMITS)
+    metaimage::read(Cursor::new([header.as_bytes(), data].concat()), files, &options())
 }
 
 fn header(element: &str, more: &str, data_file: &str) -> String {

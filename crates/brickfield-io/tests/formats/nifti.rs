@@ -73,7 +73,7 @@ fn datatype(scalar: ScalarType) -> i16 {
 }
 
 fn read(header: &NiftiHeader, data: &[u8], files: &dyn DataFiles) -> Result<Opened, ReadError> {
-    nifti::read(Cursor::new([header.bytes(), data.to_vec()].concat()), "scan", files, &LIMITS)
+    nifti::read(Cursor::new([header.bytes(), data.to_vec()].concat()), "scan", files, &options())
 }
 
 #[test]
@@ -84,7 +84,7 @@ fn every_type_in_both_orders_plain_and_gzipped() {
             let data = bytes(&ramp(scalar), order);
             assert_ramp(&read(&header, &data, &NoFiles).unwrap(), scalar);
             let packed = gzip(&[header.bytes(), data].concat());
-            assert_ramp(&nifti::read(Cursor::new(packed), "", &NoFiles, &LIMITS).unwrap(), scalar);
+            assert_ramp(&nifti::read(Cursor::new(packed), "", &NoFiles, &options()).unwrap(), scalar);
         }
     }
 }
@@ -173,9 +173,9 @@ fn headers_that_lie() {
 fn a_bomb_stays_shut() {
     let header = NiftiHeader { dim: [3, 1000, 1000, 1, 1, 1, 1, 1], ..NiftiHeader::new(2) };
     let small = gzip(&header.bytes());
-    let fault = nifti::read(Cursor::new(small), "", &NoFiles, &LIMITS).unwrap_err();
+    let fault = nifti::read(Cursor::new(small), "", &NoFiles, &options()).unwrap_err();
     assert!(matches!(fault, ReadError::TooFewCompressed { .. }), "{fault}");
     let long = gzip(&[NiftiHeader::new(2).bytes(), vec![0; 1 << 24]].concat());
-    let opened = nifti::read(Cursor::new(long), "", &NoFiles, &LIMITS).unwrap();
+    let opened = nifti::read(Cursor::new(long), "", &NoFiles, &options()).unwrap();
     assert!(matches!(opened.notes[..], [Note::SurplusData]));
 }

@@ -9,7 +9,7 @@ use crate::common::*;
 pub(crate) type Entries = BTreeMap<String, Vec<u8>>;
 
 fn read(entries: &Entries) -> Result<Opened, ReadError> {
-    ome_zarr::read_entries(entries, &LIMITS)
+    ome_zarr::read_entries(entries, &options())
 }
 
 const SCALE: &str = r#"[{"type":"scale","scale":[4,3,2]},{"type":"translation","translation":[30,20,10]}]"#;
@@ -239,5 +239,5 @@ fn a_folder_on_disk() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, bytes).unwrap();
     }
-    assert_ramp(&open(folder.path(), &LIMITS).unwrap(), ScalarType::U8);
+    assert_ramp(&open(folder.path(), &options()).unwrap(), ScalarType::U8);
 }

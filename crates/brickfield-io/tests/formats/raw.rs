@@ -4,7 +4,7 @@ use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Grid, ScalarType, Volume};
 use brickfield_io::{RawSpec, open_raw, raw};
 
-use crate::common::{DIMS, LIMITS, ORDERS, assert_near, assert_ramp, bytes, centre, ramp};
+use crate::common::{DIMS, ORDERS, assert_near, assert_ramp, bytes, centre, options, ramp};
 
 #[test]
 fn every_type_in_both_orders_after_a_header() {
@@ -13,7 +13,7 @@ fn every_type_in_both_orders_after_a_header() {
             let spec =
                 RawSpec { order, skip_bytes: 7, spacing: DVec3::new(1.0, 2.0, 3.0), ..RawSpec::new(DIMS, scalar) };
             let file = [b"7 bytes".to_vec(), bytes(&ramp(scalar), order)].concat();
-            let opened = raw::read(Cursor::new(file), &spec, &LIMITS).unwrap();
+            let opened = raw::read(Cursor::new(file), &spec, &options()).unwrap();
             assert_ramp(&opened, scalar);
             assert_near(centre(&opened, 1.0, 1.0, 1.0), [1.5, 3.0, 4.5]);
         }
@@ -28,7 +28,7 @@ fn what_is_saved_is_read_back_and_nothing_else_is_left() {
     for order in ORDERS {
         raw::save(&path, &volume, order).unwrap();
         let spec = RawSpec { order, ..RawSpec::new(DIMS, ScalarType::I16) };
-        assert_eq!(open_raw(&path, &spec, &LIMITS).unwrap().volume, volume);
+        assert_eq!(open_raw(&path, &spec, &options()).unwrap().volume, volume);
     }
     assert_eq!(folder.path().read_dir().unwrap().count(), 1);
 }
@@ -40,7 +40,7 @@ fn a_file_that_begins_like_a_known_format_is_noted() {
     let notes = |start: &[u8]| {
         std::fs::write(&path, [start, &[0; 400]].concat()).unwrap();
         let spec = RawSpec::new(UVec3::new(1, 1, start.len() as u32 + 400), ScalarType::U8);
-        let opened = open_raw(&path, &spec, &LIMITS).unwrap();
+        let opened = open_raw(&path, &spec, &options()).unwrap();
         opened.notes.iter().map(ToString::to_string).collect::<Vec<_>>()
     };
     let begins = [
@@ -62,7 +62,7 @@ fn a_file_that_begins_like_a_known_format_is_noted() {
 
 #[test]
 fn a_shape_beyond_the_file_or_the_limit_is_refused() {
-    let refusal = |spec: RawSpec| raw::read(Cursor::new([0; 24]), &spec, &LIMITS).unwrap_err().to_string();
+    let refusal = |spec: RawSpec| raw::read(Cursor::new([0; 24]), &spec, &options()).unwrap_err().to_string();
     let spec = RawSpec::new(DIMS, ScalarType::U16);
     assert_eq!(refusal(spec), "the file holds 24 bytes; 48 are promised");
     assert!(refusal(RawSpec { skip_bytes: 25, ..spec }).contains("at most the 24 bytes"));

@@ -20,16 +20,29 @@ fn seeds_for_fuzzing() {
     }
     #[cfg(feature = "ome-zarr")]
     for (i, entries) in crate::ome_zarr::examples().iter().enumerate() {
-        let entry = |(name, bytes): (&String, &Vec<u8>)| {
-            [name.as_bytes(), b"\n", &(bytes.len() as u32).to_le_bytes(), bytes].concat()
-        };
-        let packed: Vec<u8> = entries.iter().flat_map(entry).collect();
-        write(folder, "ome_zarr", &format!("{i}"), &packed);
+        write(folder, "ome_zarr", &i.to_string(), &packed(entries));
     }
     #[cfg(feature = "tiff")]
     for (i, file) in crate::tiff::examples().iter().enumerate() {
         write(folder, "tiff", &format!("{i}.tif"), file);
     }
+    #[cfg(feature = "tiff")]
+    for (i, entries) in crate::tiff_ome::examples().iter().enumerate() {
+        write(folder, "ome_tiff", &i.to_string(), &packed(entries));
+    }
+    #[cfg(any(feature = "tiff", feature = "png"))]
+    for (i, entries) in crate::pictures::examples().iter().enumerate() {
+        write(folder, "pictures", &i.to_string(), &packed(entries));
+    }
+}
+
+/// Entries as targets that read several files take them.
+#[cfg(any(feature = "ome-zarr", feature = "tiff", feature = "png"))]
+fn packed(entries: &std::collections::BTreeMap<String, Vec<u8>>) -> Vec<u8> {
+    let entry = |(name, bytes): (&String, &Vec<u8>)| {
+        [name.as_bytes(), b"\n", &(bytes.len() as u32).to_le_bytes(), bytes].concat()
+    };
+    entries.iter().flat_map(entry).collect()
 }
 
 fn write(folder: &Path, target: &str, name: &str, bytes: &[u8]) {

@@ -5,7 +5,7 @@ use ::tiff::encoder::{Compression, TiffEncoder, TiffValue};
 use ::tiff::tags::Tag;
 use brickfield_core::glam::DVec3;
 use brickfield_core::{ScalarType, Voxels};
-use brickfield_io::{Limits, Note, Opened, ReadError, tiff};
+use brickfield_io::{ChoiceKind, Limits, NoFiles, Note, Opened, ReadError, tiff};
 
 use crate::common::*;
 
@@ -30,7 +30,7 @@ where
 }
 
 pub(crate) fn read(file: Vec<u8>) -> Result<Opened, ReadError> {
-    tiff::read(Cursor::new(file), &LIMITS)
+    tiff::read(Cursor::new(file), &NoFiles, &options())
 }
 
 #[test]
@@ -63,7 +63,8 @@ fn imagej_spacing_and_channels() {
     assert_eq!(opened.unit.as_deref(), Some("micron"));
     let expected: Vec<u8> = (0..12).chain(36..48).collect();
     assert_eq!(opened.volume.voxels(), &Voxels::U8(expected));
-    assert!(matches!(&opened.notes[..], [Note::FirstOfAxis { n_entries: 3, .. }]));
+    let note = Note::OneOfSeveral { kind: ChoiceKind::Channel, read: "0".to_owned(), n_entries: 3 };
+    assert_eq!(opened.notes, [note]);
 }
 
 /// One big-endian page of 2 x 1 samples of 16 bits, by hand: the encoder only writes the machine's order.
@@ -89,13 +90,16 @@ pub(crate) fn directory(tags: &[(u16, u16)], next: u32) -> Vec<u8> {
 }
 
 /// Fixtures in both byte orders.
-pub(crate) fn examples() -> [Vec<u8>; 3] {
+pub(crate) fn examples() -> Vec<Vec<u8>> {
     let description = "ImageJ=1.53\nimages=2\nslices=2\nspacing=1.5\nunit=micron\n";
-    [
+    let mut files = vec![
         stack::<colortype::Gray16>(&[7; 24], Compression::Lzw, description),
         stack::<colortype::Gray32Float>(&[0.5; 24], Compression::Deflate(Default::default()), ""),
         big_endian([1, 2, 3, 4]),
-    ]
+        crate::tiff_imagej::example(),
+    ];
+    files.extend(crate::tiff_layout::examples());
+    files
 }
 
 #[test]
@@ -106,8 +110,6 @@ fn big_endian_pages() {
 #[test]
 fn pages_that_lie() {
     let refusal = |file| read(file).unwrap_err().to_string();
-    let colours = stack_of_colours();
-    assert!(refusal(colours).contains("colour type"));
     let mut huge = big_endian([0; 4]);
     huge[22..24].copy_from_slice(&[255, 255]);
     huge[34..36].copy_from_slice(&[255, 255]);
@@ -118,8 +120,8 @@ fn pages_that_lie() {
     assert!(
         refusal(long_tag).contains("number of a tag's values is \"8388608\"; expected at most 114, the file's bytes")
     );
-    let roomy = Limits { max_bytes: 1 << 40 };
-    assert!(matches!(tiff::read(Cursor::new(huge), &roomy), Err(ReadError::TooFewCompressed { .. })));
+    let roomy = Limits { max_bytes: 1 << 40 }.into();
+    assert!(matches!(tiff::read(Cursor::new(huge), &NoFiles, &roomy), Err(ReadError::TooFewCompressed { .. })));
     let description = "ImageJ=1.53\nimages=99\nslices=99\n";
     let short = stack::<colortype::Gray8>(&[0; 24], Compression::Uncompressed, description);
     assert!(refusal(short).contains("number of pages is \"2\"; expected 99"));
@@ -129,10 +131,4 @@ fn pages_that_lie() {
             assert!(!fault.to_string().contains('\n'));
         }
     }
-}
-
-fn stack_of_colours() -> Vec<u8> {
-    let mut out = Cursor::new(Vec::new());
-    TiffEncoder::new(&mut out).unwrap().write_image::<colortype::RGB8>(4, 3, &[0; 36]).unwrap();
-    out.into_inner()
 }

@@ -4,12 +4,12 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{ScalarType, Voxels};
-use brickfield_io::{ByteOrder, Note, Opened, ReadError, vti};
+use brickfield_io::{ByteOrder, ChoiceKind, Note, Opened, ReadError, vti};
 
 use crate::common::*;
 
 fn read(file: impl AsRef<[u8]>) -> Result<Opened, ReadError> {
-    vti::read(Cursor::new(file.as_ref()), &LIMITS)
+    vti::read(Cursor::new(file.as_ref()), &options())
 }
 
 fn type_name(scalar: ScalarType) -> &'static str {
@@ -147,7 +147,7 @@ fn the_active_scalars_of_several_arrays() {
     let zeros = "0 ".repeat(24);
     let file = inline(PLAIN, "type=\"UInt8\"", &zeros).replace("<DataArray Name=\"a\"", other);
     let opened = read(&file).unwrap();
-    assert_eq!(opened.notes, [Note::SeveralArrays { kept: "a".to_owned(), n_arrays: 2 }]);
+    assert_eq!(opened.notes, [Note::OneOfSeveral { kind: ChoiceKind::Array, read: "1 (a)".to_owned(), n_entries: 2 }]);
     assert_eq!(read(file.replace("Scalars=\"a\"", "")).unwrap().notes, opened.notes);
     let vector = read(file.replace("Scalars=\"a\"", "Scalars=\"b\"")).unwrap_err().to_string();
     assert!(vector.contains("NumberOfComponents \"3 of array b\" is not supported"), "{vector}");

@@ -5,12 +5,12 @@ pub mod values;
 use std::path::{Path, PathBuf};
 
 use brickfield_bricks::{BrickTree, BuildOptions, Downsampling, build_tree_observed};
-use brickfield_core::glam::{UVec2, UVec3};
+use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BrickSide, Grid, Level, LinearRgb, TransferFunction, Volume};
 use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
-use brickfield_io::{Limits, Opened, RawSpec, WorldFrame};
+use brickfield_io::{ChoiceKind, Limits, OpenOptions, Opened, RawSpec, WorldFrame};
 use brickfield_lod::Criterion;
-use brickfield_optics::{Preset, QuadratureRule};
+use brickfield_optics::{NarrowPeak, Preset, QuadratureRule, narrow_peak};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -27,6 +27,36 @@ pub struct InputOptions {
     /// `,spacing=SX:SY:SZ`
     #[arg(long, value_name = "SPEC", value_parser = values::raw_spec)]
     pub raw: Option<RawSpec>,
+    /// World units between samples, instead of what the file states: `SX:SY:SZ`
+    #[arg(long, value_name = "SX:SY:SZ", value_parser = values::spacing)]
+    pub spacing: Option<DVec3>,
+    /// The entries that are read where the file has several.
+    #[command(flatten)]
+    pub selection: SelectionOptions,
+}
+
+/// Which entry is read where a file has several: its number, from 0, or its name, as `brickfield info` lists them.
+#[derive(Args, Clone, Debug, Default)]
+#[allow(missing_docs)]
+pub struct SelectionOptions {
+    /// DICOM series: its number, from 0, or its UID; as all of these, `info` lists them, and the first one is the default
+    #[arg(long, value_name = "WHICH")]
+    pub series: Option<String>,
+    /// Image of a file that has several: its number or name
+    #[arg(long, value_name = "WHICH")]
+    pub image: Option<String>,
+    /// Array of a file that has several: its number or name
+    #[arg(long, value_name = "WHICH")]
+    pub array: Option<String>,
+    /// Resolution: 0 is the finest
+    #[arg(long, value_name = "WHICH")]
+    pub level: Option<String>,
+    /// Channel, component or colour: its number or name; of colours the luminance is the default
+    #[arg(long, value_name = "WHICH")]
+    pub channel: Option<String>,
+    /// Point in time
+    #[arg(long, value_name = "WHICH")]
+    pub time: Option<String>,
 }
 
 /// How the octree is built.
@@ -102,9 +132,10 @@ pub struct SamplingOptions {
     /// Distance between samples, in units of the least voxel spacing, as a decimal or a fraction
     #[arg(long, value_name = "VOXELS", default_value_t = 0.5, value_parser = values::step, allow_hyphen_values = true)]
     pub step: f64,
-    /// Quadrature rule: left-riemann, left-exponential, midpoint, pre-integrated or gauss2
-    #[arg(long, default_value = "midpoint", value_parser = values::rule)]
-    pub rule: QuadratureRule,
+    /// Quadrature rule: left-riemann, left-exponential, midpoint, pre-integrated or gauss2; midpoint unless stated, or
+    /// pre-integrated where samples would step over a peak of the transfer function
+    #[arg(long, value_parser = values::rule)]
+    pub rule: Option<QuadratureRule>,
     /// Surfaces between which samples lie: shells (spheres around the eye), tessellated-shells[=PIXELS] (their triangles:
     /// squares of PIXELS, 16, cut in two), viewport-planes (parallel to the picture) or object-planes (of constant x, y or z);
     /// shells unless stated, tessellated-shells with --polygons
@@ -184,11 +215,32 @@ impl InputOptions {
     pub fn open(&self, path: &Path) -> Result<Opened, OptionError> {
         let bar = spinner(format!("reading {}", path.display()));
         let opened = match &self.raw {
-            Some(raw) => brickfield_io::open_raw(path, raw, &self.limits()),
-            None => brickfield_io::open(path, &self.limits()),
+            Some(raw) => brickfield_io::open_raw(path, raw, &self.open_options()),
+            None => brickfield_io::open(path, &self.open_options()),
         };
         bar.finish_and_clear();
         Ok(opened?)
+    }
+
+    /// What is wanted of the file.
+    fn open_options(&self) -> OpenOptions {
+        let mut options = OpenOptions::from(self.limits());
+        options.spacing = self.spacing;
+        let SelectionOptions { series, image, array, level, channel, time } = &self.selection;
+        let wanted = [
+            (ChoiceKind::Series, series),
+            (ChoiceKind::Image, image),
+            (ChoiceKind::Array, array),
+            (ChoiceKind::Level, level),
+            (ChoiceKind::Channel, channel),
+            (ChoiceKind::Time, time),
+        ];
+        for (kind, entry) in wanted {
+            if let Some(entry) = entry {
+                options.selection.select(kind, entry);
+            }
+        }
+        options
     }
 
     /// What a reader may allocate.
@@ -268,12 +320,13 @@ impl ViewOptions {
 }
 
 impl SamplingOptions {
-    /// The scene, sampled as asked for.
+    /// The scene of a volume, sampled as asked for.
     ///
     /// # Errors
     /// Options that exclude each other.
-    pub fn of(&self, scene: Scene) -> Result<Scene, OptionError> {
+    pub fn of(&self, scene: Scene, volume: &Volume) -> Result<Scene, OptionError> {
         self.check()?;
+        let rule = self.rule.unwrap_or_else(|| self.default_rule(&scene, volume));
         let tessellated = Placement::TessellatedShells { facet_pixels: values::FACET_PIXELS };
         // Without polygons, as by default.
         let (technique, placement, division) = match self.polygons {
@@ -282,7 +335,7 @@ impl SamplingOptions {
         };
         Ok(Scene {
             step_voxels: self.step,
-            rule: self.rule,
+            rule,
             mode: self.mode,
             placement: self.placement.unwrap_or(placement),
             division: self.divide.unwrap_or(division),
@@ -291,6 +344,22 @@ impl SamplingOptions {
             skipping: if self.no_skip { Skipping::Off } else { Skipping::On },
             ..scene
         })
+    }
+
+    /// The midpoint rule, unless it steps over a peak of the transfer function: then pre-integration, and that is said.
+    fn default_rule(&self, scene: &Scene, volume: &Volume) -> QuadratureRule {
+        let narrow = match self.lengths {
+            Lengths::True => narrow_peak(volume, &scene.transfer, self.step),
+            // Only the midpoint rule has nominal lengths.
+            Lengths::Nominal => None,
+        };
+        let Some(NarrowPeak { values, change }) = narrow else { return QuadratureRule::MidpointExponential };
+        note(&format!(
+            "the transfer function has a peak at {:.6} to {:.6}, and from one sample to the next values change by {change:.6}: \
+             --rule pre-integrated is taken, for the midpoint rule would show rings",
+            values.min, values.max
+        ));
+        QuadratureRule::PreIntegrated
     }
 
     /// `prepare` refuses the same; here the options are known by name.
@@ -306,7 +375,7 @@ impl SamplingOptions {
             (Some(_), _, Some(Division::Ray), ..) => {
                 exclude(polygons(), "--divide rays".to_owned(), "polygons are clipped to bricks")
             }
-            (.., Lengths::Nominal, rule) if rule != QuadratureRule::MidpointExponential => exclude(
+            (.., Lengths::Nominal, Some(rule)) if rule != QuadratureRule::MidpointExponential => exclude(
                 "--lengths nominal".to_owned(),
                 format!("--rule {}", rule.name()),
                 "the one node must be the segment's middle; take --rule midpoint",

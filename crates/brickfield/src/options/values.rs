@@ -44,6 +44,12 @@ fn numbers<const N: usize>(text: &str, separator: char) -> Option<[f64; N]> {
     parsed.ok()?.try_into().ok().filter(|n: &[f64; N]| n.iter().all(|x| x.is_finite()))
 }
 
+/// World units between samples along x, y and z.
+pub fn spacing(text: &str) -> Result<DVec3, String> {
+    let spacing = numbers::<3>(text, ':').map(DVec3::from).filter(|s| s.min_element() > 0.0);
+    spacing.ok_or_else(|| "a spacing is SX:SY:SZ, numbers above 0, for example 0.5:0.5:2".to_owned())
+}
+
 /// The size of a picture.
 pub fn size(text: &str) -> Result<UVec2, String> {
     let sides: Option<Vec<u32>> = text.split(['x', 'X']).map(|n| n.parse().ok()).collect();

@@ -2,7 +2,7 @@
 
 use brickfield::bricks::{BrickTree, BuildOptions, Downsampling, build_tree};
 use brickfield::frame::Mode;
-use brickfield::io::{Limits, WorldFrame, open};
+use brickfield::io::{OpenOptions, WorldFrame, open};
 use brickfield::optics::automatic;
 use brickfield::{BackendKind, Residency, Scene, Skipping, Viewpoint, prepare};
 use brickfield_conformance::turns::{Contestant, Offer};
@@ -46,7 +46,7 @@ pub(crate) struct Entrant<'a> {
 /// Reads the volumes one by one.
 pub(crate) fn read(options: &Arguments) -> impl Iterator<Item = anyhow::Result<TimedVolume>> {
     VOLUMES.into_iter().map(|(name, path, skipping_gains)| {
-        let volume = open(&options.data.join(path), &Limits::default())?.volume;
+        let volume = open(&options.data.join(path), &OpenOptions::default())?.volume;
         let trees = BrickSide::ALL.into_iter().map(|side| Ok((side, tree(&volume, side)?)));
         let trees = trees.collect::<anyhow::Result<_>>()?;
         Ok(TimedVolume { name, skipping_gains, volume, trees })

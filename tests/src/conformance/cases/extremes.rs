@@ -1,7 +1,7 @@
 //! Pictures that must stay finite, bounded and equal on all backends at the ends of every range.
 
 use brickfield_core::glam::{DMat3, DVec3, UVec2, UVec3};
-use brickfield_core::{Grid, ScalarType, TransferFunction, Volume};
+use brickfield_core::{Grid, Rescale, ScalarType, TransferFunction, Volume};
 use brickfield_optics::QuadratureRule;
 
 use super::fields::{COOL, DIMS, WARM, ball, constant, grid, hills, knot, soft};
@@ -60,28 +60,36 @@ fn voxels() -> Vec<Case> {
             31 => f32::INFINITY,
             59 => f32::NEG_INFINITY,
             61 => 1e-40,
-            _ => honest.voxels().at(i) as f32,
+            _ => honest.value(i) as f32,
         };
         Volume::new(grid(), (0..honest.voxels().len()).map(value).collect::<Vec<f32>>()).expect("as many voxels")
     };
     let times = |unit: f64| {
         let honest = hills(&grid(), ScalarType::F64);
-        let values = (0..honest.voxels().len()).map(|i| unit * (honest.voxels().at(i) - 0.5));
+        let values = (0..honest.voxels().len()).map(|i| unit * (honest.value(i) - 0.5));
         Volume::new(grid(), values.collect::<Vec<f64>>()).expect("as many voxels")
     };
     let tiny = || {
         let honest = hills(&grid(), ScalarType::F32);
-        let values = (0..honest.voxels().len()).map(|i| (1e-42 * honest.voxels().at(i)) as f32);
+        let values = (0..honest.voxels().len()).map(|i| (1e-42 * honest.value(i)) as f32);
         Volume::new(grid(), values.collect::<Vec<f32>>()).expect("as many voxels")
     };
     let offset = || {
         let honest = hills(&grid(), ScalarType::F64);
-        let values = (0..honest.voxels().len()).map(|i| 1e9 + honest.voxels().at(i));
+        let values = (0..honest.voxels().len()).map(|i| 1e9 + honest.value(i));
         Volume::new(grid(), values.collect::<Vec<f64>>()).expect("as many voxels")
     };
     let over = |low: f64, high: f64| {
         let knots = [knot(low, 0.0, WARM), knot(0.5 * low + 0.5 * high, 0.1, WARM), knot(high, 0.2, COOL)];
         TransferFunction::new(knots.into()).expect("knots ascend")
+    };
+    let rescaled = move |scalar, slope: f64, intercept: f64| {
+        let stored = hills(&grid(), scalar);
+        let rescale = Rescale::new(slope, intercept).expect("a slope that is not 0");
+        let volume = Volume::rescaled(grid(), stored.voxels().clone(), rescale).expect("as many voxels, all finite");
+        let range = volume.range();
+        let at = |share: f64| range.min + share * (range.max - range.min);
+        Setup::new(volume, over(at(0.3), at(0.8)))
     };
     vec![
         picture("extreme/nan-and-infinity", catches![BricksShifted, shader::NEAREST, KnotMoved], move || {
@@ -93,9 +101,19 @@ fn voxels() -> Vec<Case> {
         // Seven of 65,536 values, in the middle, where a fraction has too few digits for a value between two of them.
         picture("extreme/16-bits-narrow", catches![shader::FRACTIONS_OF_16_BITS, KnotMoved], move || {
             let honest = hills(&grid(), ScalarType::F32);
-            let counts = (0..honest.voxels().len()).map(|i| (8.0 * (honest.voxels().at(i) - 0.5)).round() as i16);
+            let counts = (0..honest.voxels().len()).map(|i| (8.0 * (honest.value(i) - 0.5)).round() as i16);
             let volume = Volume::new(grid(), counts.collect::<Vec<i16>>()).expect("as many voxels");
             Setup::new(volume, over(-3.0, 3.0)).step(0.25)
+        }),
+        // Stored integers, of which the greatest stands for the least value.
+        picture("extreme/rescaled-u8", catches![DecodeOffset, KnotMoved, shader::NEAREST], move || {
+            rescaled(ScalarType::U8, -0.037, 12.5)
+        }),
+        picture("extreme/rescaled-i16", catches![DecodeOffset, KnotMoved], move || {
+            rescaled(ScalarType::I16, 2.5e-4, -1000.0)
+        }),
+        picture("extreme/rescaled-i32", catches![BricksShifted, KnotMoved], move || {
+            rescaled(ScalarType::I32, -1e-6, 1e3)
         }),
         picture("extreme/values-1e30", catches![RedBlueSwapped, ExtinctionScaled], move || {
             Setup::new(times(1e30), over(-3e29, 4e29))

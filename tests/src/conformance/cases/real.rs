@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use brickfield::io::{Limits, open};
+use brickfield::io::{OpenOptions, open};
 use brickfield_core::{Scalar, ScalarType, Volume, Voxels};
 use brickfield_optics::automatic;
 
@@ -43,7 +43,7 @@ pub(crate) fn read(path: &str) -> Result<Volume, NoData> {
     let Some(folder) = std::env::var_os(DATA) else {
         return Err(NoData { reason: format!("{DATA} is not set") });
     };
-    let opened = open(&Path::new(&folder).join(path), &Limits::default());
+    let opened = open(&Path::new(&folder).join(path), &OpenOptions::default());
     opened.map(|o| o.volume).map_err(|e| NoData { reason: e.to_string() })
 }
 
@@ -67,6 +67,6 @@ fn converted(volume: &Volume, scalar: ScalarType) -> Volume {
 }
 
 fn convert<T: Scalar>(volume: &Volume, shift: f64) -> Voxels {
-    let value = |i: usize| T::from_f64(volume.voxels().at(i) + shift);
+    let value = |i: usize| T::from_f64(volume.value(i) + shift);
     T::wrap((0..volume.voxels().len()).map(value).collect())
 }

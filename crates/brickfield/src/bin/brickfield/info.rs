@@ -4,13 +4,17 @@ use std::fmt::{self, Write};
 
 use brickfield::bricks::{BrickTree, LevelMemory};
 use brickfield::core::glam::DVec3;
-use brickfield::core::{Level, Volume};
-use brickfield::io::Opened;
+use brickfield::core::{Level, Rescale, Volume};
+use brickfield::io::{Choice, Opened};
+use serde_json::{Value, json};
 
 use crate::{Failure, InfoArgs, print};
 
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let opened = args.input.open(&args.file)?;
+    if args.json {
+        return print(&format!("{:#}\n", json(&opened)));
+    }
     let mut text = String::new();
     of_volume(&mut text, &opened)?;
     let notes = opened.notes.clone();
@@ -29,12 +33,64 @@ fn of_volume(text: &mut String, opened: &Opened) -> fmt::Result {
     writeln!(text, "format      {}", opened.format)?;
     writeln!(text, "dimensions  {} x {} x {}", dims.x, dims.y, dims.z)?;
     writeln!(text, "type        {}", volume.scalar_type())?;
+    if volume.rescale() != Rescale::IDENTITY {
+        let (slope, intercept) = (volume.rescale().slope(), volume.rescale().intercept());
+        writeln!(text, "rescale     values are {slope} times the stored ones, plus {intercept}")?;
+    }
     writeln!(text, "values      {} to {}", range.min, range.max)?;
     let unit = opened.unit.as_deref().unwrap_or("units");
     writeln!(text, "spacing     {} x {} x {} {unit}", spacing.x, spacing.y, spacing.z)?;
     writeln!(text, "world       {} to {} ({:?})", nine_digits(world.min), nine_digits(world.max), opened.frame)?;
+    opened.choices.iter().try_for_each(|choice| of_choice(text, choice))?;
     opened.notes.iter().try_for_each(|note| writeln!(text, "note        {note}"))
 }
+
+/// The statements of a file, for scripts.
+fn json(opened: &Opened) -> Value {
+    let volume = &opened.volume;
+    let (grid, range, rescale) = (volume.grid(), volume.range(), volume.rescale());
+    let map = grid.index_to_world();
+    let directions = [0, 1, 2].map(|axis| (map.matrix3.col(axis) / grid.spacing()[axis]).to_array());
+    let choice = |choice: &Choice| {
+        json!({
+            "kind": choice.kind.name(),
+            "entries": choice.n_entries,
+            "names": choice.names,
+            "read": choice.read,
+        })
+    };
+    json!({
+        "format": opened.format.name(),
+        "dimensions": grid.dims().to_array(),
+        "type": volume.scalar_type().name(),
+        "bytes": grid.n_voxels() * volume.scalar_type().n_bytes(),
+        "rescale": { "slope": rescale.slope(), "intercept": rescale.intercept() },
+        "values": { "min": range.min, "max": range.max },
+        "spacing": grid.spacing().to_array(),
+        "unit": opened.unit,
+        "first_sample": map.transform_point3(DVec3::splat(0.5)).to_array(),
+        "directions": directions,
+        "frame": format!("{:?}", opened.frame),
+        "choices": opened.choices.iter().map(choice).collect::<Vec<_>>(),
+        "notes": opened.notes.iter().map(|note| note.to_string()).collect::<Vec<_>>(),
+    })
+}
+
+/// The entries of a choice, the one that was read marked.
+fn of_choice(text: &mut String, choice: &Choice) -> fmt::Result {
+    let n_shown = choice.n_entries.min(MAX_SHOWN_ENTRIES);
+    for entry in 0..n_shown {
+        let (option, mark) = (format!("--{}", choice.kind), if entry == choice.read { " (read)" } else { "" });
+        writeln!(text, "{option:11} {}{mark}", choice.label(entry))?;
+    }
+    match choice.n_entries - n_shown {
+        0 => Ok(()),
+        _ => writeln!(text, "            ... to {}", choice.label(choice.n_entries - 1)),
+    }
+}
+
+/// Longer lists are cut.
+const MAX_SHOWN_ENTRIES: u64 = 32;
 
 /// Lengths without the last digits, which rounding leaves behind.
 fn nine_digits(v: DVec3) -> DVec3 {

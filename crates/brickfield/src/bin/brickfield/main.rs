@@ -1,5 +1,6 @@
-//! The `brickfield` command: look at a volume file, render it, list the backends.
+//! The `brickfield` command: look at a volume file, render it, save it in another format, list the backends.
 
+mod convert;
 mod info;
 mod render;
 
@@ -7,6 +8,7 @@ use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use brickfield::io::SAVED_EXTENSIONS;
 use brickfield::options::{Boxes, InputOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions, values};
 use brickfield::overlay::LEVEL_COLORS;
 use brickfield::{AdapterInfo, BackendError, BackendKind, BackendStatus, Validation, backends};
@@ -21,6 +23,8 @@ use clap::{Args, Parser, Subcommand};
     version,
     after_help = "Examples:
   brickfield info head.nrrd
+  brickfield info scan.ome.tif --json
+  brickfield convert dicom-folder/ -o head.nii.gz --series 1
   brickfield render head.nrrd -o head.png
   brickfield render dicom-folder/ -o head.exr --transfer ct-bone --camera \"front zoom=1.2\"
   brickfield render engine.vti -o inside.png --camera \"eye=80,100,60 target=200,128,60 up=0,0,1 fov=60\" --mode fast
@@ -32,29 +36,54 @@ struct Cli {
     command: Command,
 }
 
+const FILES_HELP: &str =
+    "Volume file or folder (NRRD, MetaImage, NIfTI, VTK, MGH, DICOM series, OME-Zarr, TIFF stack, folder of pictures)";
+
 #[derive(Subcommand)]
 enum Command {
     /// Says what a volume file holds: dimensions, type, spacing, values, and what its bricks take
     Info(InfoArgs),
     /// Renders a picture of a volume file
     Render(Box<RenderArgs>),
+    /// Saves a volume in another format: values, spacing and direction survive
+    Convert(ConvertArgs),
     /// Lists the backends and their adapters, or why there are none
     Backends,
 }
 
 #[derive(Args)]
 struct InfoArgs {
-    /// Volume file or folder (NRRD, MetaImage, NIfTI, VTI, DICOM series, OME-Zarr, TIFF stack)
+    #[arg(help = FILES_HELP)]
     file: PathBuf,
     #[command(flatten)]
     input: InputOptions,
     #[command(flatten)]
     tree: TreeOptions,
+    /// Print JSON, for scripts
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Args)]
+struct ConvertArgs {
+    #[arg(help = FILES_HELP)]
+    file: PathBuf,
+    #[arg(short, long, value_name = "VOLUME", help = convert_help())]
+    out: PathBuf,
+    /// Save samples as they are; otherwise they are compressed without loss
+    #[arg(long)]
+    unpacked: bool,
+    #[command(flatten)]
+    input: InputOptions,
+}
+
+fn convert_help() -> String {
+    format!("Volume to write; the end of its name is the format: one of {SAVED_EXTENSIONS}")
 }
 
 #[derive(Args)]
 struct RenderArgs {
-    /// Volume file or folder (NRRD, MetaImage, NIfTI, VTI, DICOM series, OME-Zarr, TIFF stack)
+    #[arg(help = FILES_HELP)]
     file: PathBuf,
     /// Picture to write: .exr (linear, for measuring) or .png (sRGB, for looking)
     #[arg(short, long, value_name = "PICTURE")]
@@ -138,6 +167,7 @@ impl<E: std::error::Error + 'static> From<E> for Failure {
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Info(args) => info::run(&args),
+        Command::Convert(args) => convert::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Backends => print(&listed_backends()),
     };

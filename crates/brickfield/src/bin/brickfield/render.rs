@@ -18,7 +18,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     check_picture_path(&args.out).map_err(Failure::usage)?;
     let mut backend = open(args)?;
     let subject = Subject::open(&args.file, &args.input, &args.tree, &args.view)?;
-    let scene = args.sampling.of(args.view.scene(&subject)?)?;
+    let scene = args.sampling.of(args.view.scene(&subject)?, &subject.volume)?;
     let mut residency = Residency::default();
     let plan = prepare(&subject.tree, &scene, &mut residency).map_err(Failure::usage)?;
     if plan.visible().is_empty() {
@@ -128,7 +128,8 @@ fn sampling(backend: &dyn Backend, scene: &Scene, plan: &FramePlan) -> String {
         _ => "rays cast".to_owned(),
     };
     let (division, lengths) = (values::division_text(scene.division), values::lengths_text(scene.lengths));
-    format!("placement {}, divide {division}, lengths {lengths}, {technique}", values::placement_text(scene.placement))
+    let placement = values::placement_text(scene.placement);
+    format!("rule {}, placement {placement}, divide {division}, lengths {lengths}, {technique}", scene.rule.name())
 }
 
 fn summary(backend: &dyn Backend, scene: &Scene, plan: &FramePlan, frame: &Frame) -> String {

@@ -3,10 +3,14 @@
 //! Orientation: sform if its code is above 0, else qform, else pixdim alone. Not: NIfTI-2, ANALYZE, colours, complex
 //! and 64-bit integers. Of a time series the first volume is read.
 
+mod write;
+
+pub use write::{save, write};
+
 use std::io::{BufRead, Cursor, Read, Seek};
 
-use brickfield_core::ScalarType;
 use brickfield_core::glam::{DMat3, DQuat, DVec3};
+use brickfield_core::{Rescale, ScalarType};
 use nifti::NiftiHeader;
 
 use crate::deflate::{check_ratio, inflate};
@@ -16,16 +20,16 @@ use crate::files::{ByteSource, n_bytes_left, open_named};
 use crate::limits::{CheckedShape, check_bytes};
 use crate::opened::FileFacts;
 use crate::placement::{AXES, GridPlacement, usable_spacing};
-use crate::rescale::{Rescale, rescaled, rescaled_type};
+use crate::rescale::StatedRescale;
 use crate::samples::{allocate, append_binary, fill_named, skip};
-use crate::{ByteOrder, DataFiles, Format, Limits, Note, Opened, ReadError, WorldFrame};
+use crate::{ByteOrder, DataFiles, Format, Note, OpenOptions, Opened, ReadError, WorldFrame};
 
 const HEADER_BYTES: usize = 348;
 
 /// Reads a NIfTI-1 file from its header on. The image of a pair is `files`' `{stem}.img` or `{stem}.img.gz`.
 ///
 /// With an sform or qform the world becomes left-posterior-superior: the file's right-anterior-superior with x and y
-/// negated. Rescaled values become f32, or f64 if the stored type is u32, i32 or f64.
+/// negated. Voxels keep their type; slope and intercept become the volume's rescale.
 ///
 /// # Errors
 /// As [`ReadError`] lists them: a header that is wrong, unsupported or beyond the limits; data that are missing.
@@ -33,19 +37,19 @@ pub fn read(
     mut input: impl BufRead + Seek,
     stem: &str,
     files: &dyn DataFiles,
-    limits: &Limits,
+    options: &OpenOptions,
 ) -> Result<Opened, ReadError> {
     let mut stream = Stream::new(&mut input)?;
     let header = read_header(&mut stream)?;
     match &header.magic {
         b"n+1\0" => {
             let at = Position { n_read: HEADER_BYTES as u64, offset: data_offset(&header)? };
-            read_image(&header, stream, at, limits)
+            read_image(&header, stream, at, options)
         }
         _ => {
             let mut image = open_image(stem, files)?;
             let at = Position { n_read: 0, offset: header_offset(&header)? };
-            read_image(&header, Stream::new(&mut *image)?, at, limits)
+            read_image(&header, Stream::new(&mut *image)?, at, options)
         }
     }
 }
@@ -130,19 +134,21 @@ struct Position {
     offset: u64,
 }
 
-fn read_image(header: &NiftiHeader, mut stream: Stream, at: Position, limits: &Limits) -> Result<Opened, ReadError> {
-    let mut found = FileFacts::plain(Format::Nifti);
+fn read_image(
+    header: &NiftiHeader,
+    mut stream: Stream,
+    at: Position,
+    options: &OpenOptions,
+) -> Result<Opened, ReadError> {
+    let mut found = FileFacts::plain(Format::Nifti, options);
     let (dims, n_all) = dims(header, &mut found.notes)?;
     let stored = scalar(header)?;
     let rescale = rescale(header, &mut found.notes);
-    let shape = CheckedShape::claim(dims, stored, limits)?;
-    if rescale != Rescale::IDENTITY {
-        CheckedShape::claim(dims, rescaled_type(stored), limits)?;
-    }
+    let shape = CheckedShape::claim(dims, stored, &options.limits)?;
     let (placement, frame) = placement(header, &mut found.notes);
     let grid = placement.grid(shape.dims)?;
     stream.check_can_hold(u128::from(at.offset) + n_all.saturating_mul(stored.n_bytes() as u128))?;
-    check_bytes(u128::from(at.offset), limits, || "the space before vox_offset".to_owned())?;
+    check_bytes(u128::from(at.offset), &options.limits, || "the space before vox_offset".to_owned())?;
     skip(&mut stream.reader, at.offset - at.n_read, "the space before vox_offset")?;
     let mut voxels = allocate(&shape)?;
     append_binary(&mut voxels, &mut stream.reader, shape.n_voxels(), order(header), "the image")?;
@@ -150,7 +156,7 @@ fn read_image(header: &NiftiHeader, mut stream: Stream, at: Position, limits: &L
         crate::deflate::check_end(&mut stream.reader, "the image", shape.n_bytes(), &mut found.notes)?;
     }
     (found.frame, found.unit) = (frame, unit(header));
-    found.finish(grid, rescaled(voxels, rescale, limits)?)
+    found.finish_rescaled(grid, voxels, rescale)
 }
 
 fn order(header: &NiftiHeader) -> ByteOrder {
@@ -215,7 +221,7 @@ fn datatype_name(code: i16) -> String {
 fn rescale(header: &NiftiHeader, notes: &mut Vec<Note>) -> Rescale {
     match header.scl_slope {
         0.0 => Rescale::IDENTITY,
-        slope => Rescale { slope: f64::from(slope), intercept: f64::from(header.scl_inter) }.usable(notes),
+        slope => StatedRescale { slope: f64::from(slope), intercept: f64::from(header.scl_inter) }.usable(notes),
     }
 }
 

@@ -3,6 +3,10 @@
 //! Data LOCAL, in one file, a LIST or a pattern; binary, zlib and text; both byte orders; HeaderSize.
 //! Not: more than one value per voxel. CenterOfRotation is ignored, as ITK does.
 
+mod write;
+
+pub use write::{save, write};
+
 use std::collections::BTreeMap;
 use std::io::{BufRead, Seek};
 
@@ -19,7 +23,7 @@ use crate::opened::FileFacts;
 use crate::placement::{AXES, GridPlacement, usable_spacing};
 use crate::samples::allocate;
 use crate::stored::{ByteSkip, DataFile, Encoding, StoredSamples};
-use crate::{ByteOrder, DataFiles, Format, Limits, Note, Opened, ReadError, WorldFrame};
+use crate::{ByteOrder, DataFiles, Format, Note, OpenOptions, Opened, ReadError, WorldFrame};
 
 /// Reads a MetaImage from its header on; `files` finds detached data.
 ///
@@ -28,16 +32,16 @@ use crate::{ByteOrder, DataFiles, Format, Limits, Note, Opened, ReadError, World
 ///
 /// # Errors
 /// As [`ReadError`] lists them: a header that is wrong, unsupported or beyond the limits; data that are missing.
-pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, limits: &Limits) -> Result<Opened, ReadError> {
-    read_from(&mut input, files, limits)
+pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
+    read_from(&mut input, files, options)
 }
 
-fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, limits: &Limits) -> Result<Opened, ReadError> {
+fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
     let header = MetaHeader::read(source)?;
     let scalar = header.scalar()?;
     let stored = header.stored()?;
-    let mut found = FileFacts::plain(Format::MetaImage);
-    let shape = CheckedShape::claim(header.volume_dims(&mut found.notes), scalar, limits)?;
+    let mut found = FileFacts::plain(Format::MetaImage, options);
+    let shape = CheckedShape::claim(header.volume_dims(&mut found.notes), scalar, &options.limits)?;
     let grid = header.placement(&mut found.notes)?.grid(shape.dims)?;
     let voxels = match &header.data {
         Some(names) => read_detached(names, header.n_samples(), &shape, &stored, files, &mut found.notes)?,

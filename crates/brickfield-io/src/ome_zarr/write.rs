@@ -1,0 +1,151 @@
+//! Writing OME-Zarr 0.5: one image at one level.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::{fs, io};
+
+use brickfield_core::glam::DVec3;
+use brickfield_core::{Grid, ScalarType, Volume, Voxels};
+use serde_json::{Value, json};
+use zarrs::array::{Array, ArraySubset};
+use zarrs::filesystem::FilesystemStore;
+use zarrs::storage::ReadableWritableListableStorage;
+
+use crate::save::{UNFINISHED, folder_of, values};
+use crate::{Compression, Format, SaveError, SaveOptions};
+
+/// Samples along a chunk's side.
+const CHUNK_SIDE: u32 = 64;
+
+/// Saves a volume as OME-Zarr 0.5 (Zarr v3): a folder, whole or not at all, for it is renamed into place.
+///
+/// # Errors
+/// If there is something of this name; if the volume's axes are not those of the world, for OME-Zarr states spacing and
+/// translation only; if the folder cannot be written to.
+pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<(), SaveError> {
+    let fault = |source| SaveError::Io { path: path.to_owned(), source };
+    if let Err(turned) = upright(volume.grid()) {
+        return Err(SaveError::Unsupported { path: path.to_owned(), format: Format::OmeZarr, fault: turned });
+    }
+    if path.exists() {
+        return Err(fault(io::ErrorKind::AlreadyExists.into()));
+    }
+    let unfinished = tempfile::Builder::new().prefix(UNFINISHED).tempdir_in(folder_of(path)).map_err(fault)?;
+    let folder = unfinished.path().join("image");
+    write(&folder, volume, options).map_err(|e| fault(io::Error::other(e)))?;
+    fs::rename(&folder, path).map_err(fault)
+}
+
+/// Whether the axes of the volume are those of the world, each in its direction.
+fn upright(grid: &Grid) -> Result<(), String> {
+    let map = grid.index_to_world().matrix3;
+    let turned =
+        |axis: usize| (map.col(axis) - DVec3::AXES[axis] * grid.spacing()[axis]).length() > 1e-9 * grid.spacing()[axis];
+    match (0..3).find(|axis| turned(*axis)) {
+        Some(axis) => Err(format!(
+            "states no direction, and axis {} of the volume goes along {} in the world; save it as NRRD or NIfTI",
+            ['x', 'y', 'z'][axis],
+            map.col(axis) / grid.spacing()[axis]
+        )),
+        None => Ok(()),
+    }
+}
+
+fn write(
+    folder: &Path,
+    volume: &Volume,
+    options: &SaveOptions,
+) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+    fs::create_dir(folder)?;
+    fs::write(folder.join("zarr.json"), serde_json::to_vec_pretty(&group(volume.grid(), options))?)?;
+    let voxels = values(volume);
+    let store: ReadableWritableListableStorage = Arc::new(FilesystemStore::new(folder)?);
+    let metadata = serde_json::from_value(array(volume.grid(), voxels.scalar_type(), options.compression))?;
+    let array = Array::new_with_metadata(store, "/0", metadata)?;
+    array.store_metadata()?;
+    let all = ArraySubset::new_with_shape(array.shape().to_vec());
+    match &*voxels {
+        Voxels::U8(v) => array.store_array_subset(&all, &v[..])?,
+        Voxels::I8(v) => array.store_array_subset(&all, &v[..])?,
+        Voxels::U16(v) => array.store_array_subset(&all, &v[..])?,
+        Voxels::I16(v) => array.store_array_subset(&all, &v[..])?,
+        Voxels::U32(v) => array.store_array_subset(&all, &v[..])?,
+        Voxels::I32(v) => array.store_array_subset(&all, &v[..])?,
+        Voxels::F32(v) => array.store_array_subset(&all, &v[..])?,
+        Voxels::F64(v) => array.store_array_subset(&all, &v[..])?,
+    }
+    Ok(())
+}
+
+/// The metadata of the image.
+fn group(grid: &Grid, options: &SaveOptions) -> Value {
+    let first_sample = grid.index_to_world().transform_point3(DVec3::splat(0.5));
+    let slowest_first = |v: DVec3| [v.z, v.y, v.x];
+    let axis = |name: &str| match unit(options) {
+        Some(unit) => json!({ "name": name, "type": "space", "unit": unit }),
+        None => json!({ "name": name, "type": "space" }),
+    };
+    let (scale, translation) = (slowest_first(grid.spacing()), slowest_first(first_sample));
+    let transformations = json!([
+        { "type": "scale", "scale": scale },
+        { "type": "translation", "translation": translation }
+    ]);
+    let axes = ["z", "y", "x"].map(axis);
+    let image = json!({
+        "axes": axes,
+        "datasets": [{ "path": "0", "coordinateTransformations": transformations }]
+    });
+    json!({
+        "zarr_format": 3,
+        "node_type": "group",
+        "attributes": { "ome": { "version": "0.5", "multiscales": [image] } }
+    })
+}
+
+/// OME-Zarr spells units out.
+fn unit(options: &SaveOptions) -> Option<&str> {
+    Some(match options.unit.as_deref()? {
+        "m" => "meter",
+        "cm" => "centimeter",
+        "mm" => "millimeter",
+        "um" | "µm" => "micrometer",
+        "nm" => "nanometer",
+        "pm" => "picometer",
+        other => other,
+    })
+}
+
+/// The metadata of the array.
+fn array(grid: &Grid, scalar: ScalarType, compression: Compression) -> Value {
+    let dims = grid.dims();
+    let shape = [dims.z, dims.y, dims.x];
+    let mut codecs = vec![json!({ "name": "bytes", "configuration": { "endian": "little" } })];
+    if compression == Compression::Lossless {
+        codecs.push(json!({ "name": "zstd", "configuration": { "level": 3, "checksum": false } }));
+    }
+    let (chunk_shape, data_type) = (shape.map(|n| n.min(CHUNK_SIDE)), data_type(scalar));
+    json!({
+        "zarr_format": 3,
+        "node_type": "array",
+        "shape": shape,
+        "data_type": data_type,
+        "chunk_grid": { "name": "regular", "configuration": { "chunk_shape": chunk_shape } },
+        "chunk_key_encoding": { "name": "default", "configuration": { "separator": "/" } },
+        "fill_value": 0,
+        "codecs": codecs,
+        "dimension_names": ["z", "y", "x"]
+    })
+}
+
+fn data_type(scalar: ScalarType) -> &'static str {
+    match scalar {
+        ScalarType::U8 => "uint8",
+        ScalarType::I8 => "int8",
+        ScalarType::U16 => "uint16",
+        ScalarType::I16 => "int16",
+        ScalarType::U32 => "uint32",
+        ScalarType::I32 => "int32",
+        ScalarType::F32 => "float32",
+        ScalarType::F64 => "float64",
+    }
+}

@@ -1,0 +1,178 @@
+//! Volumes that are saved and read back, in every format that is written.
+
+use brickfield_core::glam::{DMat3, DQuat, DVec3, EulerRot, UVec3};
+use brickfield_core::{Grid, Rescale, Volume, Voxels};
+use brickfield_io::{Compression, SaveOptions, WorldFrame, open, save};
+use proptest::prelude::*;
+
+use crate::common::options;
+
+fn any_dims() -> impl Strategy<Value = UVec3> {
+    (1u32..6, 1u32..6, 1u32..6).prop_map(UVec3::from)
+}
+
+fn any_spacing() -> impl Strategy<Value = DVec3> {
+    (1e-3f64..1e3, 1e-3f64..1e3, 1e-3f64..1e3).prop_map(DVec3::from)
+}
+
+fn any_first_sample() -> impl Strategy<Value = DVec3> {
+    (-1e7f64..1e7, -1e7f64..1e7, -1e7f64..1e7).prop_map(DVec3::from)
+}
+
+fn any_direction() -> impl Strategy<Value = DMat3> {
+    let angles = (-3.0f64..3.0, -3.0f64..3.0, -3.0f64..3.0);
+    angles.prop_map(|(a, b, c)| DMat3::from_quat(DQuat::from_euler(EulerRot::XYZ, a, b, c)))
+}
+
+fn any_voxels(n: usize) -> impl Strategy<Value = Voxels> {
+    prop_oneof![
+        prop::collection::vec(any::<u8>(), n).prop_map(Voxels::from),
+        prop::collection::vec(any::<i8>(), n).prop_map(Voxels::from),
+        prop::collection::vec(any::<u16>(), n).prop_map(Voxels::from),
+        prop::collection::vec(any::<i16>(), n).prop_map(Voxels::from),
+        prop::collection::vec(any::<u32>(), n).prop_map(Voxels::from),
+        prop::collection::vec(any::<i32>(), n).prop_map(Voxels::from),
+        prop::collection::vec(prop::num::f32::ANY, n).prop_map(Voxels::from),
+        prop::collection::vec(prop::num::f64::NORMAL, n).prop_map(Voxels::from),
+    ]
+}
+
+/// Mostly none, else one that f32 holds, else any; none of them with the greatest f64 numbers beyond their range.
+fn any_rescale() -> impl Strategy<Value = Rescale> {
+    let of = |(slope, intercept)| Rescale::new(slope, intercept).unwrap();
+    prop_oneof![
+        Just(Rescale::IDENTITY),
+        prop_oneof![Just((0.5, -1024.0)), Just((-0.25, 3.0))].prop_map(of),
+        (prop_oneof![-3f64..-1e-3, 1e-3f64..3.0], -1e4f64..1e4).prop_map(of),
+    ]
+}
+
+fn any_volume(direction: impl Strategy<Value = DMat3>) -> impl Strategy<Value = Volume> {
+    let grid =
+        (any_dims(), any_spacing(), any_first_sample(), direction).prop_map(|(dims, spacing, first, direction)| {
+            Grid::from_first_sample(dims, spacing, first, direction).unwrap()
+        });
+    (grid, any_rescale()).prop_flat_map(|(grid, rescale)| {
+        let volume = move |voxels: Voxels| Volume::rescaled(grid, voxels, rescale).ok();
+        any_voxels(grid.n_voxels()).prop_filter_map("values beyond f64", volume)
+    })
+}
+
+fn values(volume: &Volume) -> Vec<f64> {
+    (0..volume.voxels().len()).map(|i| volume.value(i)).collect()
+}
+
+/// Saves and opens; values and place must be those that were saved, to the rounding of decimal texts.
+fn check(volume: &Volume, name: &str, save_options: &SaveOptions) -> Result<(), TestCaseError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    save(&path, volume, save_options).unwrap();
+    let opened = open(&path, &options()).unwrap();
+    prop_assert_eq!(values(&opened.volume), values(volume));
+    prop_assert_eq!(opened.volume.grid().dims(), volume.grid().dims());
+    let (a, b) = (opened.volume.grid().index_to_world(), volume.grid().index_to_world());
+    prop_assert!(a.matrix3.abs_diff_eq(b.matrix3, 1e-9 * 1e3), "{} {}", a, b);
+    prop_assert!(a.translation.abs_diff_eq(b.translation, 1e-7), "{} {}", a, b);
+    prop_assert!(opened.notes.is_empty(), "{:?}", opened.notes);
+    prop_assert_eq!(folder.path().read_dir().unwrap().count(), 1);
+    if volume.rescale() == Rescale::IDENTITY {
+        prop_assert_eq!(opened.volume.voxels(), volume.voxels());
+    }
+    Ok(())
+}
+
+fn compressions() -> Vec<Compression> {
+    match cfg!(feature = "gzip") {
+        true => vec![Compression::None, Compression::Lossless],
+        false => vec![Compression::None],
+    }
+}
+
+proptest! {
+    #[test]
+    fn values_and_place_survive(
+        volume in any_volume(any_direction()),
+        frame in prop_oneof![Just(WorldFrame::Lps), Just(WorldFrame::Plain)],
+    ) {
+        for compression in compressions() {
+            let mut save_options = SaveOptions::default();
+            (save_options.frame, save_options.compression) = (frame, compression);
+            check(&volume, "volume.nrrd", &save_options)?;
+            check(&volume, "volume.mha", &save_options)?;
+        }
+    }
+
+    #[cfg(feature = "nifti")]
+    #[test]
+    fn nifti_keeps_stored_voxels_and_their_rescale(volume in any_volume(any_direction())) {
+        check(&volume, "volume.nii", &SaveOptions::default())?;
+        check(&volume, "volume.nii.gz", &SaveOptions::default())?;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("volume.nii");
+        save(&path, &volume, &SaveOptions::default()).unwrap();
+        let opened = open(&path, &options()).unwrap();
+        prop_assert_eq!(opened.volume.voxels(), volume.voxels());
+        prop_assert_eq!(opened.volume.rescale(), volume.rescale());
+    }
+
+    #[cfg(feature = "ome-zarr")]
+    #[test]
+    fn ome_zarr_keeps_values_and_place(volume in any_volume(Just(DMat3::IDENTITY))) {
+        for compression in compressions() {
+            let mut save_options = SaveOptions::default();
+            save_options.compression = compression;
+            check(&volume, "volume.ome.zarr", &save_options)?;
+        }
+    }
+}
+
+fn small(direction: DMat3) -> Volume {
+    let grid = Grid::from_first_sample(UVec3::new(70, 3, 2), DVec3::ONE, DVec3::ZERO, direction).unwrap();
+    Volume::new(grid, (0..420).map(|i| i as u16).collect::<Vec<_>>()).unwrap()
+}
+
+#[test]
+fn the_end_of_the_name_is_the_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let refusal = |name: &str| {
+        save(&folder.path().join(name), &small(DMat3::IDENTITY), &SaveOptions::default()).unwrap_err().to_string()
+    };
+    for name in ["volume.tif", "volume", ".nrrd", "nrrd"] {
+        assert!(refusal(name).ends_with("the end of the name is none of .nrrd, .mha, .nii, .nii.gz, .zarr and .raw"));
+    }
+    assert!(refusal("no folder/volume.nrrd").contains("cannot write"));
+    assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+}
+
+#[cfg(feature = "ome-zarr")]
+#[test]
+fn ome_zarr_is_whole_or_not_at_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("volume.zarr");
+    let turned = DMat3::from_cols(DVec3::Y, DVec3::X, DVec3::Z);
+    let message = save(&path, &small(turned), &SaveOptions::default()).unwrap_err().to_string();
+    assert!(
+        message.ends_with("axis x of the volume goes along [0, 1, 0] in the world; save it as NRRD or NIfTI"),
+        "{message}"
+    );
+    assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+    // More than one chunk.
+    check(&small(DMat3::IDENTITY), "volume.zarr", &SaveOptions::default()).unwrap();
+    save(&path, &small(DMat3::IDENTITY), &SaveOptions::default()).unwrap();
+    let message = save(&path, &small(DMat3::IDENTITY), &SaveOptions::default()).unwrap_err().to_string();
+    assert!(message.contains("volume.zarr: cannot write: entity already exists"), "{message}");
+    assert_eq!(folder.path().read_dir().unwrap().count(), 1);
+}
+
+#[test]
+fn units_survive_where_the_format_has_them() {
+    for name in ["v.nrrd", "v.nii", "v.zarr"] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        let mut save_options = SaveOptions::default();
+        save_options.unit = Some("um".to_owned());
+        save(&path, &small(DMat3::IDENTITY), &save_options).unwrap();
+        let unit = open(&path, &options()).unwrap().unit;
+        assert!(matches!(unit.as_deref(), Some("um" | "micrometer")), "{name} {unit:?}");
+    }
+}
