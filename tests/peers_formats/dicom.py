@@ -1,25 +1,20 @@
-"""DICOM files written by independent software, and what an independent reader finds in them.
+"""DICOM files by pydicom, and what pydicom, SimpleITK and nibabel find in them.
 
-Requires Python 3.11 or later with
-    pydicom >= 3.0, numpy >= 2.0, pyjpegls >= 1.5 (JPEG-LS), pylibjpeg-openjpeg >= 2.4 (JPEG 2000),
-    SimpleITK >= 2.4 and nibabel >= 5.3 (second readers, asked when this file is run as a script).
+Requires pydicom >= 3.0, numpy >= 2.0, pyjpegls >= 1.5 (JPEG-LS), pylibjpeg-openjpeg >= 2.4 (JPEG 2000), SimpleITK >= 2.4 and
+nibabel >= 5.3.
 
-`make(folder)` writes one file or folder per case and yields `(name, path, expected)`:
-    values    numpy array, z, y, x
-    spacing   x, y, z
-    first     position of the first voxel's centre, or None where the file states none
-    direction rows of the matrix whose columns are the directions of x, y and z
-    selection {"series": ..., "time": ..., "array": ..., "channel": ...} that the case is read with
-    tolerance greatest difference of a value; 0 but for lossy files
-    itk       the second reader: SimpleITK on a "series" or on a "file", "nibabel", or None where neither reads the kind
-Run as a script it holds `expected` against the second readers and prints a table.
+`make(folder)` as in run.py. The voxels are those that were written, and of lossy files those that pydicom reads. Where a second
+reader knows the kind it is asked too: SimpleITK for a series or a file, nibabel for mosaics.
 """
 
-import sys
+import warnings
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+import nibabel.nicom.dicomwrappers as nibabel_dicom
 import pydicom
+import SimpleITK as sitk
 from pydicom.dataset import Dataset, FileDataset, FileMetaDataset
 from pydicom.encaps import encapsulate
 from pydicom.sequence import Sequence
@@ -44,9 +39,13 @@ def ramp(dtype, shape=SHAPE, low=0, high=None):
     return np.clip(values, low, high).astype(dtype)
 
 
-def expected(values, spacing=SPACING, first=FIRST, direction=AXIAL, tolerance=0, itk="series", **selection):
-    return dict(values=values, spacing=spacing, first=first, direction=direction, tolerance=tolerance, itk=itk,
-                selection=selection)
+def expected(voxels, spacing=SPACING, first=FIRST, direction=AXIAL, tolerance=0, itk="series", **select):
+    """The columns of `direction` are the directions of x, y and z."""
+    case = {"voxels": voxels, "spacing": spacing, "first_sample": first, "direction": direction.T, "tolerance": tolerance,
+            "select": select}
+    if itk is not None:
+        case["second_reader"] = partial(second_reader, kind=itk, case=case)
+    return case
 
 
 def base(sop_class=CT, syntax=uid.ExplicitVRLittleEndian):
@@ -430,8 +429,7 @@ def mosaics(folder):
 
 
 def read_by_itk(path, kind):
-    """Values z, y, x, the affine matrix."""
-    import SimpleITK as sitk
+    """Voxels z, y, x, the affine matrix."""
     if kind == "series":
         reader = sitk.ImageSeriesReader()
         reader.SetFileNames(reader.GetGDCMSeriesFileNames(str(path)))
@@ -445,42 +443,26 @@ def read_by_itk(path, kind):
 
 
 def read_by_nibabel(path):
-    import warnings
     warnings.simplefilter("ignore")
-    from nibabel.nicom.dicomwrappers import wrapper_from_file
-    image = wrapper_from_file(str(path))
+    image = nibabel_dicom.wrapper_from_file(str(path))
     # Its axes are rows, columns, slices.
     affine = image.affine[:, [1, 0, 2, 3]]
     return np.moveaxis(np.asarray(image.get_data(), float), [0, 1, 2], [1, 2, 0]), affine
 
 
-def differences(path, case):
-    """What a second reader finds otherwise; slices against the normal are turned first."""
-    values, affine = read_by_nibabel(path) if case["itk"] == "nibabel" else read_by_itk(path, case["itk"])
-    if np.linalg.det(affine) < 0 or affine[:3, 2] @ case["direction"][:, 2] < 0:
-        affine[:3, 3] += affine[:3, 2] * (len(values) - 1)
+def second_reader(path, kind, case):
+    """The parts that a second reader finds otherwise; slices against the normal are turned first."""
+    voxels, affine = read_by_nibabel(path) if kind == "nibabel" else read_by_itk(path, kind)
+    direction = case["direction"].T
+    if np.linalg.det(affine) < 0 or affine[:3, 2] @ direction[:, 2] < 0:
+        affine[:3, 3] += affine[:3, 2] * (len(voxels) - 1)
         affine[:3, 2] *= -1
-        values = values[::-1]
+        voxels = voxels[::-1]
     same = {
-        "shape": values.shape == case["values"].shape,
-        "position": np.allclose(affine[:3, 3], case["first"], atol=1e-4),
-        "steps": np.allclose(affine[:3, :3], case["direction"] * case["spacing"], atol=1e-5),
-        "values": values.shape == case["values"].shape
-        and np.allclose(values, case["values"], rtol=1e-6, atol=case["tolerance"]),
+        "dimensions": voxels.shape == case["voxels"].shape,
+        "position": np.allclose(affine[:3, 3], case["first_sample"], atol=1e-4),
+        "steps": np.allclose(affine[:3, :3], direction * case["spacing"], atol=1e-5),
+        "values": voxels.shape == case["voxels"].shape
+        and np.allclose(voxels, case["voxels"], rtol=1e-6, atol=case["tolerance"]),
     }
     return [part for part, is_same in same.items() if not is_same]
-
-
-if __name__ == "__main__":
-    import tempfile
-    target = sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp()
-    for case_name, case_path, case in make(target):
-        reader = {"nibabel": "nibabel", None: None}.get(case["itk"], "SimpleITK")
-        if reader is None:
-            print(f"{case_name:24} written; no second reader")
-            continue
-        try:
-            wrong = differences(case_path, case)
-        except RuntimeError as fault:
-            wrong = ["refused: " + str(fault).splitlines()[-1][-60:]]
-        print(f"{case_name:24} {f'as {reader} reads it' if not wrong else f'{reader} differs: ' + ', '.join(wrong)}")

@@ -1,7 +1,7 @@
 """Files by independent software, read by independent software and by `brickfield`: dimensions, spacing, direction and all values
 must be equal.
 
-Requires Python 3.11 or later and the packages that the modules beside this one name (`dicom.py`, `stored.py`, `tiff.py`):
+Requires Python 3.11 or later and the packages that the modules beside this one name (`dicom.py`, `tiff.py`, ...):
 
     python3 -m venv target/peers
     target/peers/bin/pip install numpy pydicom pylibjpeg pylibjpeg-openjpeg pyjpegls SimpleITK tifffile imagecodecs pillow \\
@@ -18,6 +18,8 @@ Each module has `make(folder)`, which writes files and yields (name, path, expec
     direction     three unit vectors, of x, y and z; may be missing
     first_sample  the world position of the first sample; may be missing
     unit          the unit of world lengths; may be missing
+    tolerance     greatest difference of a value, for lossy files; 0 if missing
+    second_reader a function of the path: the parts that another reader finds unlike `expected`; may be missing
     select        a dict from the kind of a choice to the entry that is wanted; may be missing
     options       further options of `brickfield`; may be missing
     refused       a part of the message, for a file that is to be refused; the other keys do not count then
@@ -33,7 +35,7 @@ import tempfile
 
 import numpy as np
 
-MODULES = ["dicom", "tiff", "stored"]
+MODULES = ["dicom", "tiff", "nrrd_nifti", "zarr_vtk"]
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 NRRD_TYPES = {
     "uint8": "u1", "int8": "i1", "uint16": "<u2", "int16": "<i2", "uint32": "<u4", "int32": "<i4", "float": "<f4", "double": "<f8",
@@ -86,9 +88,12 @@ def differences(program, path, expected, folder):
     said = brickfield(program, "convert", path, "-o", copy, "--unpacked", *options)
     if said.returncode != 0:
         return found + [said.stderr.strip()], shown
-    n_unlike = int(np.count_nonzero(read_nrrd(copy).astype(float) != voxels.astype(float)))
+    distances = np.abs(read_nrrd(copy).astype(float) - voxels.astype(float))
+    n_unlike = int(np.count_nonzero(~(distances <= expected.get("tolerance", 0))))
     if n_unlike:
         found.append(f"{n_unlike} of {voxels.size} values")
+    if "second_reader" in expected:
+        found += [f"{part}: the second reader differs" for part in expected["second_reader"](path)]
     return found, shown
 
 

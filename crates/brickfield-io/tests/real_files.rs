@@ -37,7 +37,7 @@ const FILES: &[(&str, &str, &str, f64)] = &[
     ("headsq", "ct/headsq/quarter.nhdr", "i16", 1.0),
     ("frogtissue", "ct/frogtissue.mhd", "u8", 1.0),
     ("fuel", "formats/fuel.nii.gz", "u8", 1.0),
-    ("spm152", "mri/spm152.nii.gz", "f32", 90.739_097_595_214_84 / 250.0),
+    ("spm152", "mri/spm152.nii.gz", "u8", 0.362_956_404_685_974_12),
     ("fetal_template_T2", "mri/fetal_template_T2.nrrd", "f32", 1.0),
     ("hydrogen", "formats/hydrogen.vti", "f32", 1.0),
     ("GE_head_dicom", "ct/GE_head_dicom", "i16", 1.0),
@@ -115,7 +115,7 @@ const HALVES: &[(&str, &str, &str)] = &[
         "the data after the header holds ",
         " bytes, then its compressed data are cut off; 8716288 are promised",
     ),
-    ("formats/mri-stack.tif", "the file ends at byte ", ", before the tags of page 2 of 27 at byte 1135163"),
+    ("formats/mri-stack.tif", "the file ends at byte ", ", before the tags of page 2 at byte 1135163"),
 ];
 
 fn half_of_it_says_how_much_came(folder: &Path, path: &str) -> Result<(), Failed> {

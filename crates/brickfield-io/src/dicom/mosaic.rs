@@ -76,7 +76,7 @@ const MAX_CSA_TAGS: u32 = 1024;
 /// A tag is a name of 64 bytes, four numbers, the number of items, and one more number. An item is four numbers of which
 /// the second (the first one in version 1, too) is its length, then a text, filled up to a multiple of 4.
 fn csa_numbers(csa: &[u8], wanted: &str) -> Option<Vec<f64>> {
-    let mut at = if csa.starts_with(b"SV10") { &csa[8..] } else { csa };
+    let mut at = if csa.starts_with(b"SV10") { csa.get(8..)? } else { csa };
     let n_tags = word(at, 0)?.min(MAX_CSA_TAGS);
     at = at.get(8..)?;
     for _ in 0..n_tags {

@@ -169,7 +169,7 @@ pub(crate) fn read(slices: &[Slice]) -> Result<Opened, ReadError> {
 }
 
 fn voxels(opened: &Opened) -> Vec<f64> {
-    (0..opened.volume.voxels().len()).map(|i| opened.volume.voxels().at(i)).collect()
+    (0..opened.volume.voxels().len()).map(|i| opened.volume.value(i)).collect()
 }
 
 #[test]
@@ -211,7 +211,7 @@ fn bits_beyond_the_stored_ones_are_no_part_of_the_value() {
 }
 
 #[test]
-fn rescales_by_integers_keep_integers() {
+fn rescales_keep_integers() {
     let with = |rescale, pixels: [i32; 6]| {
         let slice = Slice { rescale: Some(rescale), pixels: pixels.to_vec(), ..Slice::at(0.0) };
         read(&[slice]).unwrap().volume
@@ -221,8 +221,8 @@ fn rescales_by_integers_keep_integers() {
     assert_eq!(with(("1.0", "5"), pixels).scalar_type(), ScalarType::U16);
     assert_eq!(with(("10", "-1"), [0, 1, 2, 3, 4, 65535]).voxels().at(5), 655_349.0);
     assert_eq!(with(("10", "-1"), [0, 1, 2, 3, 4, 65535]).scalar_type(), ScalarType::I32);
-    assert_eq!(with(("0.5", "0"), pixels).scalar_type(), ScalarType::F32);
-    assert_eq!(with(("0.5", "0"), pixels).voxels().at(5), 2047.5);
+    assert_eq!(with(("0.5", "0"), pixels).scalar_type(), ScalarType::U16);
+    assert_eq!(with(("0.5", "0"), pixels).value(5), 2047.5);
 }
 
 #[test]

@@ -164,5 +164,5 @@ pub(crate) fn read_all(files: Vec<Vec<u8>>, wanted: &[(ChoiceKind, &str)]) -> Re
 }
 
 pub(crate) fn values(opened: &Opened) -> Vec<f64> {
-    (0..opened.volume.voxels().len()).map(|i| opened.volume.voxels().at(i)).collect()
+    (0..opened.volume.voxels().len()).map(|i| opened.volume.value(i)).collect()
 }

@@ -198,6 +198,8 @@ fn a_mosaic_that_does_not_say_how_it_is_laid_out_is_refused_by_name() {
     assert!(fault.contains("NumberOfImagesInMosaic of a Siemens mosaic is missing"), "{fault}");
     let fault = read_one(mosaic(Some(csa(["0", "0", "1"], "7")))).unwrap_err().to_string();
     assert!(fault.contains("NumberOfImagesInMosaic is \"7 in 4 x 2\"; expected tiles of one size"), "{fault}");
+    let fault = read_one(mosaic(Some(b"SV10\x04\0".to_vec()))).unwrap_err().to_string();
+    assert!(fault.contains("NumberOfImagesInMosaic of a Siemens mosaic is missing"), "{fault}");
     let cut = csa(["0", "0", "1"], "3");
     let fault = read_one(mosaic(Some(cut[..cut.len() - 30].to_vec()))).unwrap_err().to_string();
     assert!(fault.contains("SliceNormalVector of a Siemens mosaic is missing"), "{fault}");

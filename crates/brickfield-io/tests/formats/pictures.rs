@@ -69,7 +69,7 @@ mod of_png {
         assert_eq!(opened.volume.voxels(), &Voxels::U8(vec![1, 2, 3, 4]));
         assert_eq!(
             opened.notes[0].to_string(),
-            "2 files are no slices and were skipped, first \"about.txt\": it is neither TIFF nor PNG"
+            "2 files are no slices of this volume and were skipped, first \"about.txt\": it is neither TIFF nor PNG"
         );
     }
 
