@@ -77,7 +77,8 @@ fn reduced<T: Scalar>(mut values: Vec<T>, n_channels: usize, part: ColourPart) -
     T::wrap(values)
 }
 
-fn luminance<T: Scalar>([red, green, blue]: [T; 3]) -> T {
+/// The luminance; of integers it is rounded.
+pub(crate) fn luminance<T: Scalar>([red, green, blue]: [T; 3]) -> T {
     if red == green && green == blue {
         return red;
     }

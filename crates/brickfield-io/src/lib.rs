@@ -38,6 +38,8 @@ mod rescale;
 mod samples;
 mod save;
 mod stored;
+mod stored_type;
+mod stored_voxel;
 #[cfg(feature = "tiff")]
 pub mod tiff;
 #[cfg(feature = "vti")]
@@ -58,3 +60,6 @@ pub use save::{Compression, SAVED_EXTENSIONS, SaveError, SaveOptions, save};
 
 /// The scalar types that can be read, for messages.
 pub(crate) const SCALARS: &str = "8, 16 and 32 bit integers, 32 and 64 bit floats are";
+
+/// The stored types that can be read, for messages.
+pub(crate) const STORED_TYPES: &str = "8 to 64 bit integers, 32 and 64 bit floats are";

@@ -10,10 +10,10 @@ pub use write::{save, write};
 use std::collections::BTreeMap;
 use std::io::{BufRead, Seek};
 
+use brickfield_core::ScalarType;
 use brickfield_core::glam::DVec3;
-use brickfield_core::{ScalarType, Voxels};
 
-use crate::detached::read_detached;
+use crate::detached::{Promised, read_detached};
 use crate::error::{Shown, counted};
 use crate::file_list::FileNames;
 use crate::files::ByteSource;
@@ -21,8 +21,8 @@ use crate::limits::CheckedShape;
 use crate::lines::{HeaderLines, numbers};
 use crate::opened::FileFacts;
 use crate::placement::{AXES, GridPlacement, usable_spacing};
-use crate::samples::allocate;
-use crate::stored::{ByteSkip, DataFile, Encoding, StoredSamples};
+use crate::stored::{ByteSkip, Encoding, StoredSamples};
+use crate::stored_type::StoredType;
 use crate::{ByteOrder, DataFiles, Format, Note, OpenOptions, Opened, ReadError, WorldFrame};
 
 /// Reads a MetaImage from its header on; `files` finds detached data.
@@ -38,32 +38,18 @@ pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, options: &Ope
 
 fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
     let header = MetaHeader::read(source)?;
-    let scalar = header.scalar()?;
+    let stored_type = header.stored_type()?;
     let stored = header.stored()?;
     let mut found = FileFacts::plain(Format::MetaImage, options);
-    let shape = CheckedShape::claim(header.volume_dims(&mut found.notes), scalar, &options.limits)?;
+    let shape = CheckedShape::claim(header.volume_dims(&mut found.notes), stored_type, &options.limits)?;
     let grid = header.placement(&mut found.notes)?.grid(shape.dims)?;
+    let promised = Promised { n_voxels: header.n_samples(), n_before: 0 };
     let voxels = match &header.data {
-        Some(names) => read_detached(names, header.n_samples(), &shape, &stored, files, &mut found.notes)?,
-        None => read_local(source, &header, &shape, &stored, &mut found.notes)?,
+        Some(names) => read_detached(names, promised, &shape, &stored, files, &mut found.notes)?,
+        None => stored.read(source, &promised.attached(&shape), &shape, &mut found.notes)?,
     };
     found.frame = header.frame();
     found.finish(grid, voxels)
-}
-
-fn read_local(
-    source: &mut dyn ByteSource,
-    header: &MetaHeader,
-    shape: &CheckedShape,
-    stored: &StoredSamples,
-    notes: &mut Vec<Note>,
-) -> Result<Voxels, ReadError> {
-    let part =
-        DataFile { name: "the data after the header", n_samples: header.n_samples(), n_wanted: shape.n_voxels() };
-    stored.seek_samples(source, &part, shape.scalar.n_bytes())?;
-    let mut voxels = allocate(shape)?;
-    stored.append(&mut voxels, source, &part, notes)?;
-    Ok(voxels)
 }
 
 struct MetaHeader {
@@ -121,12 +107,12 @@ impl MetaHeader {
         self.sizes.iter().fold(1u128, |n, s| n.saturating_mul(u128::from(*s)))
     }
 
-    fn scalar(&self) -> Result<ScalarType, ReadError> {
+    fn stored_type(&self) -> Result<StoredType, ReadError> {
         if let Some(channels) = self.text(&["elementnumberofchannels"]).filter(|v| *v != "1") {
             return Err(ReadError::unsupported("ElementNumberOfChannels", channels, "1 is"));
         }
         let name = self.text(&["elementtype"]).ok_or(ReadError::Missing { field: "ElementType" })?;
-        Ok(match name {
+        let scalar = match name {
             "MET_UCHAR" => ScalarType::U8,
             "MET_CHAR" => ScalarType::I8,
             "MET_USHORT" => ScalarType::U16,
@@ -135,8 +121,11 @@ impl MetaHeader {
             "MET_INT" | "MET_LONG" => ScalarType::I32,
             "MET_FLOAT" => ScalarType::F32,
             "MET_DOUBLE" => ScalarType::F64,
-            _ => return Err(ReadError::unsupported("ElementType", name, crate::SCALARS)),
-        })
+            "MET_LONG_LONG" => return Ok(StoredType::I64),
+            "MET_ULONG_LONG" => return Ok(StoredType::U64),
+            _ => return Err(ReadError::unsupported("ElementType", name, crate::STORED_TYPES)),
+        };
+        Ok(scalar.into())
     }
 
     fn stored(&self) -> Result<StoredSamples, ReadError> {

@@ -9,6 +9,7 @@ use crate::file_list::FileNames;
 use crate::files::ByteSource;
 use crate::lines::{HeaderLines, numbers};
 use crate::stored::{ByteSkip, Encoding, StoredSamples};
+use crate::stored_type::StoredType;
 use crate::{ByteOrder, Format, ReadError};
 
 /// Field names are in lower case and without spaces, so that "data file" and "datafile" are one.
@@ -86,9 +87,9 @@ impl NrrdHeader {
         self.sizes.iter().fold(1u128, |n, s| n.saturating_mul(u128::from(*s)))
     }
 
-    pub(super) fn scalar(&self) -> Result<ScalarType, ReadError> {
+    pub(super) fn stored_type(&self) -> Result<StoredType, ReadError> {
         let name = self.required("type", "type")?.to_ascii_lowercase();
-        Ok(match name.as_str() {
+        let scalar = match name.as_str() {
             "signed char" | "int8" | "int8_t" => ScalarType::I8,
             "uchar" | "unsigned char" | "uint8" | "uint8_t" => ScalarType::U8,
             "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => ScalarType::I16,
@@ -97,17 +98,28 @@ impl NrrdHeader {
             "uint" | "unsigned int" | "uint32" | "uint32_t" => ScalarType::U32,
             "float" => ScalarType::F32,
             "double" => ScalarType::F64,
-            _ => return Err(ReadError::unsupported("type", name, crate::SCALARS)),
-        })
+            "longlong"
+            | "long long"
+            | "long long int"
+            | "signed long long"
+            | "signed long long int"
+            | "int64"
+            | "int64_t" => return Ok(StoredType::I64),
+            "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => {
+                return Ok(StoredType::U64);
+            }
+            _ => return Err(ReadError::unsupported("type", name, crate::STORED_TYPES)),
+        };
+        Ok(scalar.into())
     }
 
-    pub(super) fn stored(&self, scalar: ScalarType) -> Result<StoredSamples, ReadError> {
+    pub(super) fn stored(&self, stored: StoredType) -> Result<StoredSamples, ReadError> {
         let encoding = self.encoding()?;
         let order = match self.text("endian").map(str::to_ascii_lowercase).as_deref() {
             Some("little") => ByteOrder::Little,
             Some("big") => ByteOrder::Big,
             Some(other) => return Err(ReadError::field("endian", other, "little or big")),
-            None if scalar.n_bytes() == 1 || encoding == Encoding::Text => ByteOrder::Little,
+            None if stored.n_bytes() == 1 || encoding == Encoding::Text => ByteOrder::Little,
             None => return Err(ReadError::Missing { field: "endian" }),
         };
         Ok(StoredSamples { encoding, order, line_skip: self.line_skip()?, byte_skip: self.byte_skip()? })

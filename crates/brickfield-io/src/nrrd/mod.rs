@@ -11,12 +11,10 @@ pub use write::{save, write};
 
 use std::io::{BufRead, Seek};
 
-use crate::detached::read_detached;
+use crate::detached::{Promised, read_detached};
 use crate::files::ByteSource;
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
-use crate::samples::allocate;
-use crate::stored::DataFile;
 use crate::{DataFiles, Format, OpenOptions, Opened, ReadError};
 use header::NrrdHeader;
 use space::Space;
@@ -34,22 +32,16 @@ pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, options: &Ope
 
 fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
     let header = NrrdHeader::read(source)?;
-    let scalar = header.scalar()?;
-    let stored = header.stored(scalar)?;
+    let stored_type = header.stored_type()?;
+    let stored = header.stored(stored_type)?;
     let mut found = FileFacts::plain(Format::Nrrd, options);
     let space = Space::of(&header, &mut found.notes)?;
-    let shape = CheckedShape::claim(space.dims, scalar, &options.limits)?;
+    let shape = CheckedShape::claim(space.dims, stored_type, &options.limits)?;
     let grid = space.placement.grid(shape.dims)?;
+    let promised = Promised { n_voxels: header.n_samples(), n_before: 0 };
     let voxels = match header.file_names()? {
-        Some(names) => read_detached(&names, header.n_samples(), &shape, &stored, files, &mut found.notes)?,
-        None => {
-            let n_wanted = shape.n_voxels();
-            let part = DataFile { name: "the data after the header", n_samples: header.n_samples(), n_wanted };
-            stored.seek_samples(source, &part, scalar.n_bytes())?;
-            let mut voxels = allocate(&shape)?;
-            stored.append(&mut voxels, source, &part, &mut found.notes)?;
-            voxels
-        }
+        Some(names) => read_detached(&names, promised, &shape, &stored, files, &mut found.notes)?,
+        None => stored.read(source, &promised.attached(&shape), &shape, &mut found.notes)?,
     };
     (found.frame, found.unit) = (space.frame, space.unit);
     found.finish(grid, voxels)

@@ -50,14 +50,14 @@ impl WordSize {
 pub(super) fn check_plain(words: &mut WordReader, n_left: u64, shape: &CheckedShape) -> Result<(), ReadError> {
     let stated = words.next()?;
     let expected = match words.size {
-        WordSize::Four => shape.n_bytes() & 0xffff_ffff,
-        WordSize::Eight => shape.n_bytes(),
+        WordSize::Four => shape.n_stored_bytes() & 0xffff_ffff,
+        WordSize::Eight => shape.n_stored_bytes(),
     };
     if stated != expected {
         let expected = format!("{expected}, from the extent and the type");
         return Err(ReadError::field(format!("length of {}", words.what), stated, expected));
     }
-    check_length(words.what, n_left, u128::from(shape.n_bytes()))
+    check_length(words.what, n_left, u128::from(shape.n_stored_bytes()))
 }
 
 /// zlib blocks, decoded one after the other.
@@ -81,8 +81,8 @@ pub(super) fn read_blocks<'a>(
     let [n_blocks, block_bytes, partial_bytes] = [words.next()?, words.next()?, words.next()?];
     let n_whole = if partial_bytes > 0 { n_blocks.saturating_sub(1) } else { n_blocks };
     let n_bytes = u128::from(n_whole) * u128::from(block_bytes) + u128::from(partial_bytes);
-    if n_bytes != u128::from(shape.n_bytes()) {
-        let expected = format!("{}, from the extent and the type", shape.n_bytes());
+    if n_bytes != u128::from(shape.n_stored_bytes()) {
+        let expected = format!("{}, from the extent and the type", shape.n_stored_bytes());
         return Err(ReadError::field(format!("length of {what}"), n_bytes, expected));
     }
     if block_bytes == 0 && n_whole > 0 {

@@ -127,9 +127,9 @@ fn read_array(
     let n_left = n_bytes_left(source)?;
     match document.storage(array)? {
         ArrayStorage::Text => {
-            check_length(&what, n_left, least_text_bytes(shape.n_voxels()))?;
+            check_length(&what, n_left, least_text_bytes(shape.n_voxels() as u128))?;
             let mut voxels = allocate(shape)?;
-            append_text(&mut voxels, &mut UntilTag::new(source), shape.n_voxels(), &what)?;
+            append_text(&mut voxels, &mut UntilTag::new(source), shape.n_voxels(), shape.voxel, &what)?;
             Ok(voxels)
         }
         ArrayStorage::Raw => {
@@ -171,12 +171,12 @@ fn read_binary(
         false => {
             check_plain(&mut words, n_left, shape)?;
             voxels = allocate(shape)?;
-            append_binary(&mut voxels, words.reader, shape.n_voxels(), document.order, what)?;
+            append_binary(&mut voxels, words.reader, shape.n_voxels(), shape.voxel, document.order, what)?;
         }
         true => {
             let mut blocks = read_blocks(words, n_left, shape)?;
             voxels = allocate(shape)?;
-            append_binary(&mut voxels, &mut blocks, shape.n_voxels(), document.order, what)?;
+            append_binary(&mut voxels, &mut blocks, shape.n_voxels(), shape.voxel, document.order, what)?;
         }
     }
     Ok(voxels)

@@ -22,14 +22,14 @@ pub(crate) fn cases() -> Vec<BadFile> {
             name: "v.nrrd",
             good: b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 4 3 2\nencoding: raw\n\n012345678901234567890123".to_vec(),
             absurd: (b"4 3 2", b"16384 16384 4096", "1099511627776 bytes; the limit is"),
-            unsupported: (b"uchar", b"int64", "type \"int64\" is not supported"),
+            unsupported: (b"uchar", b"block", "type \"block\" is not supported"),
         },
         BadFile {
             name: "v.mha",
             good: b"NDims = 3\nDimSize = 4 3 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n012345678901234567890123"
                 .to_vec(),
             absurd: (b"4 3 2", b"16384 16384 4096", "1099511627776 bytes; the limit is"),
-            unsupported: (b"MET_UCHAR", b"MET_LONG_LONG", "ElementType \"MET_LONG_LONG\" is not supported"),
+            unsupported: (b"MET_UCHAR", b"MET_STRING", "ElementType \"MET_STRING\" is not supported"),
         },
     ];
     #[cfg(feature = "vti")]

@@ -24,6 +24,7 @@ mod pictures;
 mod raw;
 mod save;
 mod seeds;
+mod stored;
 #[cfg(feature = "tiff")]
 mod tiff;
 #[cfg(feature = "tiff")]
