@@ -12,8 +12,9 @@ mod even;
 mod file_list;
 mod files;
 mod folder;
+mod foreign;
 mod format;
-#[cfg(any(feature = "dicom", feature = "ome-zarr", feature = "tiff", feature = "png"))]
+#[cfg(any(feature = "dicom", feature = "ome-zarr", feature = "tiff", feature = "png", feature = "vti"))]
 mod guard;
 #[cfg(any(feature = "ome-zarr", feature = "tiff"))]
 mod length_unit;
@@ -44,6 +45,8 @@ mod stored_voxel;
 pub mod tiff;
 #[cfg(feature = "vti")]
 pub mod vti;
+mod vtk_arrays;
+pub mod vtk_legacy;
 
 pub use choice::{Choice, ChoiceKind, Selection};
 pub use error::{Damage, OpenError, ReadError, Shown};

@@ -72,6 +72,15 @@ pub(crate) fn allocate(shape: &CheckedShape) -> Result<Voxels, ReadError> {
     }
 }
 
+/// Appends `n` zeros.
+#[cfg(any(feature = "tiff", feature = "vti"))]
+pub(crate) fn append_zeros(voxels: &mut Voxels, n: usize) {
+    fn append<T: Scalar>(values: &mut Vec<T>, n: usize) {
+        values.resize(values.len() + n, T::from_f64(0.0));
+    }
+    with_voxels!(voxels, v => append(v, n));
+}
+
 /// Appends the part that is read of `n` binary voxels; `what` names the source in errors.
 pub(crate) fn append_binary(
     voxels: &mut Voxels,

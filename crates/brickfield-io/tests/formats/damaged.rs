@@ -39,6 +39,7 @@ const TEXT: &[(&str, &str)] = &[
         "v.vti",
         "not VTK XML ImageData: the start of the file is \"hello world\\n\", expected XML with the root element VTKFile",
     ),
+    ("v.vtk", "not legacy VTK: the start of the file is \"hello world\", expected # vtk DataFile Version"),
     #[cfg(feature = "tiff")]
     ("v.tif", "not TIFF: the start of the file is \"hello world\\n\", expected II or MM, then 42 or 43"),
     #[cfg(feature = "dicom")]

@@ -39,3 +39,6 @@ mod tiff_layout;
 mod tiff_ome;
 #[cfg(feature = "vti")]
 mod vti;
+#[cfg(feature = "vti")]
+mod vti_pieces;
+mod vtk_legacy;
