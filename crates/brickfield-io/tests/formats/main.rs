@@ -42,3 +42,5 @@ mod vti;
 #[cfg(feature = "vti")]
 mod vti_pieces;
 mod vtk_legacy;
+#[cfg(feature = "ome-zarr")]
+mod zarr_arrays;

@@ -25,7 +25,7 @@ fn seeds_for_fuzzing() {
     #[cfg(feature = "vti")]
     write(folder, "pvti", "0", &packed(&crate::vti_pieces::parallel()));
     #[cfg(feature = "ome-zarr")]
-    for (i, entries) in crate::ome_zarr::examples().iter().enumerate() {
+    for (i, entries) in crate::ome_zarr::examples().iter().chain(&crate::zarr_arrays::examples()).enumerate() {
         write(folder, "ome_zarr", &i.to_string(), &packed(entries));
     }
     #[cfg(feature = "tiff")]
