@@ -1,7 +1,7 @@
 """Files by independent software, read by independent software and by `brickfield`: dimensions, spacing, direction and all values
 must be equal.
 
-Requires Python 3.11 or later and the packages that the modules beside this one name (`dicom.py`, `stored.py`, `tiff.py`):
+Requires Python 3.11 or later and the packages that the modules beside this one name (`dicom.py`, `stored.py`, `tiff.py`, `zarr_vtk.py`):
 
     python3 -m venv target/peers
     target/peers/bin/pip install numpy pydicom pylibjpeg pylibjpeg-openjpeg pyjpegls SimpleITK tifffile imagecodecs pillow \\
@@ -33,7 +33,7 @@ import tempfile
 
 import numpy as np
 
-MODULES = ["dicom", "tiff", "stored"]
+MODULES = ["dicom", "tiff", "stored", "zarr_vtk"]
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 NRRD_TYPES = {
     "uint8": "u1", "int8": "i1", "uint16": "<u2", "int16": "<i2", "uint32": "<u4", "int32": "<i4", "float": "<f4", "double": "<f8",

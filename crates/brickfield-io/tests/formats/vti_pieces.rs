@@ -86,8 +86,10 @@ fn holes_and_pieces_outside_are_errors() {
     assert_eq!(unlike, "components of array \"a\" in piece 2 is \"1 of Int16\"; expected 1 of UInt8");
 }
 
+type Files = BTreeMap<String, Vec<u8>>;
+
 /// A .pvti of two files, one of them in a folder beside it.
-pub(crate) fn parallel() -> BTreeMap<String, Vec<u8>> {
+pub(crate) fn parallel() -> Files {
     let master = "<VTKFile type=\"PImageData\"><PImageData WholeExtent=\"0 3 0 2 0 1\" GhostLevel=\"0\" Spacing=\"1 2 3\">\
                   <PPointData Scalars=\"a\"><PDataArray type=\"UInt8\" Name=\"a\"/></PPointData>\
                   <Piece Extent=\"0 2 0 2 0 1\" Source=\"v/0.vti\"/><Piece Extent=\"2 3 0 2 0 1\" Source=\"1.vti\"/>\
@@ -99,7 +101,7 @@ pub(crate) fn parallel() -> BTreeMap<String, Vec<u8>> {
     ])
 }
 
-fn read_parallel(entries: &BTreeMap<String, Vec<u8>>) -> Result<Opened, ReadError> {
+fn read_parallel(entries: &Files) -> Result<Opened, ReadError> {
     vti::read(Cursor::new(&entries["v.pvti"]), entries, &options())
 }
 
@@ -117,7 +119,7 @@ fn pieces_in_files_beside() {
 
 #[test]
 fn pieces_in_files_that_are_missing_damaged_or_elsewhere() {
-    let said = |change: &dyn Fn(&mut BTreeMap<String, Vec<u8>>)| {
+    let said = |change: &dyn Fn(&mut Files)| {
         let mut entries = parallel();
         change(&mut entries);
         read_parallel(&entries).unwrap_err().to_string()
