@@ -62,8 +62,6 @@ pub(crate) struct VtkArray {
     pub(crate) n_components: u64,
     /// Names of the components; empty where they have none.
     pub(crate) component_names: Vec<String>,
-    /// Whether its three or four components are colours, whatever their type.
-    pub(crate) are_colours: bool,
     /// Whether the file names it as the scalars to show.
     pub(crate) is_active: bool,
 }
@@ -79,8 +77,7 @@ impl VtkArray {
     /// The voxels of the array: the component that is wanted of several; three or four bytes are a colour.
     pub(crate) fn voxel(&self, found: &mut FileFacts) -> Result<StoredVoxel, ReadError> {
         let stored = self.sample()?.stored();
-        let colours =
-            Colours::of_channels(self.n_components).filter(|_| self.are_colours || stored == ScalarType::U8.into());
+        let colours = Colours::of_channels(self.n_components).filter(|_| stored == ScalarType::U8.into());
         match (self.n_components, colours) {
             (1, _) => Ok(stored.into()),
             (_, Some(colours)) => StoredVoxel::of_colours(stored, colours, found),

@@ -168,7 +168,6 @@ impl Document {
             support: *support,
             n_components,
             component_names: component_names(e, n_components)?,
-            are_colours: false,
             is_active: active.as_ref() == Some(&name),
             name,
             type_name,

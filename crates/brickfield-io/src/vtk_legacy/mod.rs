@@ -3,6 +3,7 @@
 //! Versions 1.0 to 5.1, as text and binary (big endian). Not: other data sets, strings, text and binary mixed.
 
 mod sections;
+mod shares;
 mod types;
 
 use std::io::{BufRead, Seek, SeekFrom};
@@ -17,12 +18,13 @@ use crate::samples::{allocate, append_binary, append_text, least_text_bytes};
 use crate::vtk_arrays::{Bits, VtkSample, choose, dims};
 use crate::{ByteOrder, Format, OpenOptions, Opened, ReadError};
 use sections::{Sections, StoredArray};
+use shares::Shares;
 
 /// Reads structured points.
 ///
-/// The first SCALARS of POINT_DATA are read, else its first array of one component, else CELL_DATA's in the same way.
-/// Cell values are samples at cell centres. The world is the file's own. Colours that are written as text are numbers
-/// from 0 to 1 and stay so.
+/// The first SCALARS or COLOR_SCALARS of POINT_DATA are read, else its first array of one component, else CELL_DATA's in the same way.
+/// Cell values are samples at cell centres. The world is the file's own. The numbers from 0 to 1 that VTK writes for bytes
+/// as text are read as these bytes.
 ///
 /// # Errors
 /// As [`ReadError`] lists them: sections that are wrong, unsupported or beyond the limits; data that are missing.
@@ -69,6 +71,7 @@ fn read_array(
     let mut voxels = allocate(shape)?;
     let (n, voxel, order) = (shape.n_voxels(), shape.voxel, ByteOrder::Big);
     match (is_binary, sample) {
+        (false, _) if array.are_shares => append_text(&mut voxels, &mut Shares::new(source), n, voxel, &what)?,
         (false, _) => append_text(&mut voxels, source, n, voxel, &what)?,
         (true, VtkSample::Bit) => {
             let mut source = source;

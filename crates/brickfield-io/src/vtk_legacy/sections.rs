@@ -18,6 +18,8 @@ pub(super) struct StoredArray {
     pub(super) about: VtkArray,
     pub(super) n_voxels: u64,
     pub(super) position: u64,
+    /// Whether its numbers are shares of 255, from 0 to 1: bytes of colours as text.
+    pub(super) are_shares: bool,
 }
 
 impl StoredArray {
@@ -99,7 +101,7 @@ impl Sections {
             let supported = "before POINT_DATA and CELL_DATA, those of STRUCTURED_POINTS are";
             return Err(ReadError::unsupported("section", words.get(0), supported));
         };
-        let component_count: u64 = match keyword.as_str() {
+        let n_components: u64 = match keyword.as_str() {
             "scalars" if words.0.len() > 3 => words.number(3, "components of SCALARS")?,
             "scalars" | "global_ids" | "pedigree_ids" | "edge_flags" => 1,
             "color_scalars" => words.number(2, "components of COLOR_SCALARS")?,
@@ -114,18 +116,20 @@ impl Sections {
         };
         let are_colours = keyword == "color_scalars";
         let type_name = match keyword.as_str() {
-            "color_scalars" if self.is_binary => "unsigned_char",
-            "color_scalars" => "float",
+            "color_scalars" => "unsigned_char",
             "texture_coordinates" => words.get(3),
             _ => words.get(2),
         };
         if keyword == "scalars" {
             check_table(source)?;
         }
-        let is_active =
-            keyword == "scalars" && !self.arrays.iter().any(|a| a.about.is_active && a.about.support == support);
-        let about = array(words.get(1), type_name, support, component_count);
-        self.add(source, VtkArray { is_active, are_colours, ..about }, n_voxels, true)
+        let has_active = self.arrays.iter().any(|a| a.about.is_active && a.about.support == support);
+        let is_active = (keyword == "scalars" || are_colours) && !has_active;
+        let about = array(words.get(1), type_name, support, n_components);
+        let are_shares = are_colours && !self.is_binary;
+        let array = self.pass(source, VtkArray { is_active, ..about }, n_voxels, are_shares)?;
+        self.arrays.push(array);
+        Ok(())
     }
 
     /// Arrays of any size; those before POINT_DATA and CELL_DATA are about the whole.
@@ -144,27 +148,27 @@ impl Sections {
             let n_voxels = words.number(2, "size of a FIELD array")?;
             let support = self.around.map_or(Support::Points, |(support, _)| support);
             let about = array(words.get(0), words.get(3), support, n_components);
-            self.add(source, about, n_voxels, self.around.is_some())?;
+            let array = self.pass(source, about, n_voxels, false)?;
+            if self.around.is_some() {
+                self.arrays.push(array);
+            }
         }
         Ok(())
     }
 
     /// Notes where the array is, and passes over its numbers.
-    fn add(
-        &mut self,
+    fn pass(
+        &self,
         source: &mut dyn ByteSource,
         about: VtkArray,
         n_voxels: u64,
-        is_kept: bool,
-    ) -> Result<(), ReadError> {
+        are_shares: bool,
+    ) -> Result<StoredArray, ReadError> {
         let position = source.stream_position().map_err(|e| ReadError::io("the file", e))?;
-        let array = StoredArray { about, n_voxels, position };
+        let array = StoredArray { about, n_voxels, position, are_shares };
         let n_samples = n_voxels.saturating_mul(array.about.n_components);
         self.skip(source, array.about.sample()?, n_samples, &array.what())?;
-        if is_kept {
-            self.arrays.push(array);
-        }
-        Ok(())
+        Ok(array)
     }
 
     fn skip(
@@ -199,7 +203,6 @@ fn array(name: &str, type_name: &str, support: Support, n_components: u64) -> Vt
         support,
         n_components,
         component_names: Vec::new(),
-        are_colours: false,
         is_active: false,
     }
 }

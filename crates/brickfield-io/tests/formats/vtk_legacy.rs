@@ -125,9 +125,22 @@ fn arrays_are_chosen_by_name() {
         assert_eq!(array("v").volume.voxels(), &Voxels::F32((0..24).map(|i| (3 * i) as f32).collect()));
         let colours = array("c");
         assert_eq!(colours.notes, [Note::Luminance]);
-        let expected = if is_binary { ScalarType::U8 } else { ScalarType::F32 };
-        assert_eq!(colours.volume.scalar_type(), expected);
+        let mut options = options();
+        options.selection.select(ChoiceKind::Array, "c");
+        options.selection.select(ChoiceKind::Channel, "green");
+        let green = vtk_legacy::read(Cursor::new(&file), &options).unwrap();
+        assert_eq!(green.volume.voxels(), &Voxels::U8((0..24).map(|i| 3 * i + 1).collect()));
     }
+}
+
+#[test]
+fn bytes_as_text_are_shares_of_255() {
+    let shares = (0..24).map(|i| format!("{:.6}", f64::from(i * 11) / 255.0)).collect::<Vec<_>>().join(" ");
+    let opened = read(&text_file(&format!("COLOR_SCALARS a 1\n{shares}\n"))).unwrap();
+    assert_eq!(opened.volume.voxels(), &Voxels::U8((0..24).map(|i| i * 11).collect()));
+    assert!(opened.notes.is_empty());
+    let beyond = read(&text_file(&format!("COLOR_SCALARS a 1\n7{shares}\n"))).unwrap_err().to_string();
+    assert_eq!(beyond, "sample 0 is \"1785\"; expected a number that fits u8");
 }
 
 #[test]
