@@ -140,7 +140,7 @@ fn bytes_as_text_are_shares_of_255() {
     assert_eq!(opened.volume.voxels(), &Voxels::U8((0..24).map(|i| i * 11).collect()));
     assert!(opened.notes.is_empty());
     let beyond = read(&text_file(&format!("COLOR_SCALARS a 1\n7{shares}\n"))).unwrap_err().to_string();
-    assert_eq!(beyond, "sample 0 is \"1785\"; expected a number that fits u8");
+    assert_eq!(beyond, "sample 0 is \"17850\"; expected a number that fits u8");
 }
 
 #[test]
