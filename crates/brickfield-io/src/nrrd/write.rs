@@ -7,7 +7,9 @@ use brickfield_core::glam::DVec3;
 use brickfield_core::{Grid, ScalarType, Volume};
 
 use crate::save::{save_atomically, values, write_samples};
-use crate::{ByteOrder, Compression, SaveError, SaveOptions, WorldFrame};
+#[cfg(feature = "gzip")]
+use crate::Compression;
+use crate::{ByteOrder, SaveError, SaveOptions, WorldFrame};
 
 /// Saves a volume as attached NRRD (`.nrrd`): whole or not at all, for the file is renamed into place.
 ///
