@@ -38,6 +38,7 @@ pub mod raw;
 mod rescale;
 mod samples;
 mod save;
+mod series;
 mod stored;
 mod stored_type;
 mod stored_voxel;

@@ -88,3 +88,15 @@ pub(crate) fn check_bytes(n_bytes: u128, limits: &Limits, what: impl Fn() -> Str
     }
     Ok(())
 }
+
+/// How many samples axes of these sizes have in all.
+///
+/// # Errors
+/// If 64 bits do not hold their number.
+pub(crate) fn n_samples(field: &'static str, sizes: &[u64]) -> Result<u128, ReadError> {
+    let n = sizes.iter().try_fold(1u64, |n, size| n.checked_mul(*size));
+    n.map(u128::from).ok_or_else(|| {
+        let all: Vec<_> = sizes.iter().map(u64::to_string).collect();
+        ReadError::field(field, all.join(" "), "numbers whose product is below 18446744073709551616")
+    })
+}

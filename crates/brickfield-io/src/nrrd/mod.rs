@@ -1,9 +1,11 @@
 //! NRRD, attached and detached (Kindlmann, "Definition of NRRD file format", teem.sourceforge.net/nrrd/format.html).
 //!
 //! Encodings raw, ascii and gzip, both byte orders, line and byte skip, data files as one name, a list or a pattern.
-//! Not: bzip2 and hex; more than one value per voxel.
+//! Voxels of several numbers, series, layers of segmentations: one of them is read. Not: bzip2 and hex.
 
+mod axes;
 mod header;
+mod segments;
 mod space;
 mod write;
 
@@ -16,6 +18,7 @@ use crate::files::ByteSource;
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
 use crate::{DataFiles, Format, OpenOptions, Opened, ReadError};
+use axes::Part;
 use header::NrrdHeader;
 use space::Space;
 
@@ -36,9 +39,10 @@ fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenO
     let stored = header.stored(stored_type)?;
     let mut found = FileFacts::plain(Format::Nrrd, options);
     let space = Space::of(&header, &mut found.notes)?;
-    let shape = CheckedShape::claim(space.dims, stored_type, &options.limits)?;
+    let Part { voxel, n_before } = Part::choose(&header, &space.axes, stored_type, &mut found)?;
+    let shape = CheckedShape::claim(space.dims, voxel, &options.limits)?;
     let grid = space.placement.grid(shape.dims)?;
-    let promised = Promised { n_voxels: header.n_samples(), n_before: 0 };
+    let promised = Promised { n_voxels: header.n_samples / u128::from(voxel.n_components), n_before };
     let voxels = match header.file_names()? {
         Some(names) => read_detached(&names, promised, &shape, &stored, files, &mut found.notes)?,
         None => stored.read(source, &promised.attached(&shape), &shape, &mut found.notes)?,

@@ -17,6 +17,7 @@ mod metaimage;
 #[cfg(feature = "nifti")]
 mod nifti;
 mod nrrd;
+mod nrrd_axes;
 #[cfg(feature = "ome-zarr")]
 mod ome_zarr;
 #[cfg(any(feature = "tiff", feature = "png"))]
