@@ -31,6 +31,7 @@ pub(crate) struct CheckedShape {
     pub(crate) scalar: ScalarType,
     pub(crate) voxel: StoredVoxel,
     /// What it was held against.
+    #[cfg_attr(not(feature = "gzip"), allow(dead_code, reason = "only what is packed or in pieces needs it again"))]
     pub(crate) limits: Limits,
 }
 
@@ -70,7 +71,7 @@ impl CheckedShape {
     }
 
     /// Bytes of all components in the file.
-    #[cfg(any(feature = "vti", feature = "nifti"))]
+    #[cfg(feature = "nifti")]
     pub(crate) fn n_stored_bytes(&self) -> u64 {
         self.n_voxels_claimed() as u64 * self.voxel.n_bytes() as u64
     }

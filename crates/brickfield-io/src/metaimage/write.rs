@@ -7,9 +7,9 @@ use std::path::Path;
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Grid, ScalarType, Volume};
 
-use crate::save::{save_atomically, values, write_samples};
 #[cfg(feature = "gzip")]
 use crate::Compression;
+use crate::save::{save_atomically, values, write_samples};
 use crate::{ByteOrder, SaveError, SaveOptions, WorldFrame};
 
 /// Saves a volume as attached MetaImage (`.mha`): whole or not at all, for the file is renamed into place.
