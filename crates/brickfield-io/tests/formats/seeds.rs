@@ -23,6 +23,10 @@ fn seeds_for_fuzzing() {
         write(folder, "vtk_legacy", &format!("{i}.vtk"), file);
     }
     #[cfg(feature = "vti")]
+    for (compressor, file) in crate::vti::examples() {
+        write(folder, "vti", &format!("{compressor}.vti"), &file);
+    }
+    #[cfg(feature = "vti")]
     write(folder, "pvti", "0", &packed(&crate::vti_pieces::parallel()));
     #[cfg(feature = "ome-zarr")]
     for (i, entries) in crate::ome_zarr::examples().iter().chain(&crate::zarr_arrays::examples()).enumerate() {

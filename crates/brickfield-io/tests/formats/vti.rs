@@ -158,12 +158,28 @@ fn the_active_scalars_of_several_arrays() {
 }
 
 /// 0 to 23 in blocks of 10 bytes, each packed by `pack`.
-fn packed(compressor: &'static str, pack: impl Fn(&[u8]) -> Vec<u8>) -> Result<Opened, ReadError> {
+fn packed_file(compressor: &'static str, pack: impl Fn(&[u8]) -> Vec<u8>) -> Vec<u8> {
     let style = Style { compressor, ..PLAIN };
     let data: Vec<u8> = (0..24).collect();
     let blocks: Vec<Vec<u8>> = data.chunks(10).map(pack).collect();
     let words: Vec<usize> = [3, 10, 4].into_iter().chain(blocks.iter().map(Vec::len)).collect();
-    read(appended(style, "type=\"UInt8\" offset=\"0\"", "raw", &[style.words(&words), blocks.concat()].concat()))
+    appended(style, "type=\"UInt8\" offset=\"0\"", "raw", &[style.words(&words), blocks.concat()].concat())
+}
+
+fn packed(compressor: &'static str, pack: impl Fn(&[u8]) -> Vec<u8>) -> Result<Opened, ReadError> {
+    read(packed_file(compressor, pack))
+}
+
+const LZ4: &str = " compressor=\"vtkLZ4DataCompressor\"";
+const LZMA: &str = " compressor=\"vtkLZMADataCompressor\"";
+
+fn xz(block: &[u8]) -> Vec<u8> {
+    STANDARD.decode(XZ_BLOCKS[usize::from(block[0]) / 10]).unwrap()
+}
+
+/// Files of blocks, by the name of their compressor.
+pub(crate) fn examples() -> [(&'static str, Vec<u8>); 2] {
+    [("lz4", packed_file(LZ4, lz4_flex::block::compress)), ("lzma", packed_file(LZMA, xz))]
 }
 
 /// Blocks of [`packed`] as .xz streams, by Python's lzma (liblzma, as VTK).
@@ -178,11 +194,8 @@ const XZ_HUGE_DICTIONARY: &str =
 
 #[test]
 fn blocks_of_lz4_and_lzma() {
-    const LZ4: &str = " compressor=\"vtkLZ4DataCompressor\"";
-    const LZMA: &str = " compressor=\"vtkLZMADataCompressor\"";
     let expected = Voxels::U8((0..24).collect());
     assert_eq!(packed(LZ4, lz4_flex::block::compress).unwrap().volume.voxels(), &expected);
-    let xz = |block: &[u8]| STANDARD.decode(XZ_BLOCKS[usize::from(block[0]) / 10]).unwrap();
     assert_eq!(packed(LZMA, xz).unwrap().volume.voxels(), &expected);
     let short = |block: &[u8]| lz4_flex::block::compress(&block[..block.len() - 1]);
     assert_eq!(
