@@ -22,9 +22,9 @@ use shares::Shares;
 
 /// Reads structured points.
 ///
-/// The first SCALARS or COLOR_SCALARS of POINT_DATA are read, else its first array of one component, else CELL_DATA's in the same way.
-/// Cell values are samples at cell centres. The world is the file's own. The numbers from 0 to 1 that VTK writes for bytes
-/// as text are read as these bytes.
+/// The first SCALARS or COLOR_SCALARS of POINT_DATA are read, else its first array of one component, else CELL_DATA's in
+/// the same way. Cell values are samples at cell centres. The world is the file's own. The numbers from 0 to 1 that VTK
+/// writes for bytes as text are read as these bytes.
 ///
 /// # Errors
 /// As [`ReadError`] lists them: sections that are wrong, unsupported or beyond the limits; data that are missing.

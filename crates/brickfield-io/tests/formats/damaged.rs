@@ -337,10 +337,10 @@ mod changed {
     }
 
     #[cfg(any(feature = "vti", feature = "ome-zarr"))]
-    fn check_entries(
-        entries: &std::collections::BTreeMap<String, Vec<u8>>,
-        read: &dyn Fn(&std::collections::BTreeMap<String, Vec<u8>>) -> Result<Opened, ReadError>,
-    ) {
+    type Entries = std::collections::BTreeMap<String, Vec<u8>>;
+
+    #[cfg(any(feature = "vti", feature = "ome-zarr"))]
+    fn check_entries(entries: &Entries, read: &dyn Fn(&Entries) -> Result<Opened, ReadError>) {
         for (name, bytes) in entries {
             check(bytes, &|changed| {
                 let mut entries = entries.clone();

@@ -52,17 +52,10 @@ fn pieces_that_share_points_or_overlap() {
 
 #[test]
 fn pieces_of_cells() {
-    let cells: String = [([0, 2, 0, 2, 0, 1], "1 2 4 5"), ([2, 3, 0, 2, 0, 1], "3 6")]
-        .map(|(extent, numbers)| {
-            let Some((head, _)) = piece(extent).split_once("\">1").map(|(h, t)| (h.to_owned(), t.to_owned())) else {
-                let empty = piece(extent);
-                let start = empty.find("ascii\">").unwrap() + 7;
-                return format!("{}{numbers}</DataArray></PointData></Piece>", &empty[..start]);
-            };
-            format!("{head}\">{numbers}</DataArray></PointData></Piece>")
-        })
-        .concat()
-        .replace("PointData", "CellData");
+    let cells = |extent: [usize; 6], values: &str| {
+        piece(extent).replace("PointData", "CellData").replace(&numbers(extent), values)
+    };
+    let cells = cells([0, 2, 0, 2, 0, 1], "1 2 4 5") + &cells([2, 3, 0, 2, 0, 1], "3 6");
     let opened = vti::read(Cursor::new(image(&cells)), &NoFiles, &options()).unwrap();
     assert_eq!(opened.volume.voxels(), &Voxels::U8(vec![1, 2, 3, 4, 5, 6]));
 }
