@@ -124,6 +124,15 @@ pub(crate) enum Entries {
     Numbered(u64),
 }
 
+impl Entries {
+    pub(crate) fn n_entries(&self) -> u64 {
+        match self {
+            Entries::Named(names) => names.len() as u64,
+            Entries::Numbered(n) => *n,
+        }
+    }
+}
+
 /// The entry that is read, and whether the caller wanted it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Chosen {
@@ -141,9 +150,10 @@ impl Choices {
     /// # Errors
     /// If there is no entry of the wanted number or name.
     pub(crate) fn choose(&mut self, kind: ChoiceKind, entries: Entries, default: u64) -> Result<Chosen, ReadError> {
-        let (n_entries, names) = match entries {
-            Entries::Named(names) => (names.len() as u64, names),
-            Entries::Numbered(n) => (n, Vec::new()),
+        let n_entries = entries.n_entries();
+        let names = match entries {
+            Entries::Named(names) => names,
+            Entries::Numbered(_) => Vec::new(),
         };
         let wanted = self.wanted.0.remove(&kind);
         let entry = match &wanted {

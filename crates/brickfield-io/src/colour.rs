@@ -1,6 +1,8 @@
 //! Volumes in colour: one channel of them, or their luminance.
 
-use brickfield_core::{Scalar, Voxels, with_voxels};
+use brickfield_core::Scalar;
+#[cfg(any(feature = "dicom", feature = "tiff", feature = "png", test))]
+use brickfield_core::{Voxels, with_voxels};
 
 use crate::choice::Entries;
 use crate::opened::FileFacts;
@@ -57,12 +59,14 @@ impl Colours {
         }
     }
 
+    #[cfg(any(feature = "dicom", feature = "tiff", feature = "png", test))]
     /// One value for each voxel, in place: integers of the luminance are rounded.
     pub(crate) fn reduce(self, interleaved: Voxels, part: ColourPart) -> Voxels {
         with_voxels!(interleaved, v => reduced(v, self.n_channels(), part))
     }
 }
 
+#[cfg(any(feature = "dicom", feature = "tiff", feature = "png", test))]
 fn reduced<T: Scalar>(mut values: Vec<T>, n_channels: usize, part: ColourPart) -> Voxels {
     let n_voxels = values.len() / n_channels;
     for i in 0..n_voxels {
@@ -77,7 +81,8 @@ fn reduced<T: Scalar>(mut values: Vec<T>, n_channels: usize, part: ColourPart) -
     T::wrap(values)
 }
 
-fn luminance<T: Scalar>([red, green, blue]: [T; 3]) -> T {
+/// The luminance; of integers it is rounded.
+pub(crate) fn luminance<T: Scalar>([red, green, blue]: [T; 3]) -> T {
     if red == green && green == blue {
         return red;
     }

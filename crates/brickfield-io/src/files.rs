@@ -60,6 +60,12 @@ pub(crate) fn open_named<'a>(files: &'a dyn DataFiles, name: &str) -> Result<Box
     files.open(name).map_err(|e| ReadError::io(format!("data file {name:?}"), e))
 }
 
+/// Whether a path with slashes stays in the folder.
+#[cfg(any(feature = "ome-zarr", feature = "vti"))]
+pub(crate) fn stays_within(path: &str) -> bool {
+    path.split('/').all(|part| !matches!(part, "" | "." | "..")) && !path.contains(['\\', ':', '\0'])
+}
+
 /// Bytes from the current position to the end; the position stays.
 pub(crate) fn n_bytes_left(source: &mut dyn ByteSource) -> Result<u64, ReadError> {
     let measure = |s: &mut dyn ByteSource| -> io::Result<u64> {

@@ -14,6 +14,7 @@ pub enum Format {
     MetaImage,
     Nifti,
     Vti,
+    VtkLegacy,
     Dicom,
     OmeZarr,
     Tiff,
@@ -23,11 +24,12 @@ pub enum Format {
 
 impl Format {
     /// All formats.
-    pub const ALL: [Format; 9] = [
+    pub const ALL: [Format; 10] = [
         Format::Nrrd,
         Format::MetaImage,
         Format::Nifti,
         Format::Vti,
+        Format::VtkLegacy,
         Format::Dicom,
         Format::OmeZarr,
         Format::Tiff,
@@ -42,6 +44,7 @@ impl Format {
             Format::MetaImage => "MetaImage",
             Format::Nifti => "NIfTI",
             Format::Vti => "VTK XML ImageData",
+            Format::VtkLegacy => "legacy VTK",
             Format::Dicom => "DICOM",
             Format::OmeZarr => "OME-Zarr",
             Format::Tiff => "TIFF",
@@ -56,7 +59,8 @@ impl Format {
             Format::Nrrd => &["nrrd", "nhdr"],
             Format::MetaImage => &["mha", "mhd"],
             Format::Nifti => &["nii", "nii.gz", "hdr", "hdr.gz"],
-            Format::Vti => &["vti"],
+            Format::Vti => &["vti", "pvti"],
+            Format::VtkLegacy => &["vtk"],
             Format::Dicom => &["dcm", "dicom", "ima"],
             Format::OmeZarr => &["zarr"],
             Format::Tiff => &["tif", "tiff"],
@@ -68,7 +72,7 @@ impl Format {
     /// Whether [`open`](crate::open) in this build can read it. Raw files need [`open_raw`](crate::open_raw).
     pub const fn is_readable(self) -> bool {
         match self {
-            Format::Nrrd | Format::MetaImage => true,
+            Format::Nrrd | Format::MetaImage | Format::VtkLegacy => true,
             Format::Nifti => cfg!(feature = "nifti"),
             Format::Vti => cfg!(feature = "vti"),
             Format::Dicom => cfg!(feature = "dicom"),
@@ -92,6 +96,8 @@ impl Format {
     pub fn from_magic(head: &[u8]) -> Option<Format> {
         if head.starts_with(b"NRRD00") {
             Some(Format::Nrrd)
+        } else if head.starts_with(b"# vtk DataFile") {
+            Some(Format::VtkLegacy)
         } else if head.get(128..132) == Some(b"DICM") {
             Some(Format::Dicom)
         } else if is_nifti(head) {
@@ -141,20 +147,4 @@ pub(crate) fn is_tiff(head: &[u8]) -> bool {
         [b'M', b'M', b, a, ..] => classic_or_big(*a, *b),
         _ => false,
     }
-}
-
-/// Formats that are known well enough to be named in an error.
-pub(crate) fn foreign(head: &[u8]) -> Option<&'static str> {
-    const MAGICS: [(&[u8], &str); 9] = [
-        (b" BDV", "OpenVDB"),
-        (b"\x89HDF", "HDF5"),
-        (b"\x89PNG", "PNG"),
-        (b"\xff\xd8\xff", "JPEG"),
-        (b"# vtk DataFile", "legacy VTK"),
-        (b"VOLS\n", "SDSC VOL"),
-        (b"VOLB\n", "SDSC VOL"),
-        (b"\0\0\0\x0cjP", "JPEG 2000"),
-        (b"PK\x03\x04", "zip archive"),
-    ];
-    MAGICS.into_iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, name)| name)
 }

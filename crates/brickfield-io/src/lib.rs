@@ -12,8 +12,9 @@ mod even;
 mod file_list;
 mod files;
 mod folder;
+mod foreign;
 mod format;
-#[cfg(any(feature = "dicom", feature = "ome-zarr", feature = "tiff", feature = "png"))]
+#[cfg(any(feature = "dicom", feature = "ome-zarr", feature = "tiff", feature = "png", feature = "vti"))]
 mod guard;
 #[cfg(any(feature = "ome-zarr", feature = "tiff"))]
 mod length_unit;
@@ -37,11 +38,16 @@ pub mod raw;
 mod rescale;
 mod samples;
 mod save;
+mod series;
 mod stored;
+mod stored_type;
+mod stored_voxel;
 #[cfg(feature = "tiff")]
 pub mod tiff;
 #[cfg(feature = "vti")]
 pub mod vti;
+mod vtk_arrays;
+pub mod vtk_legacy;
 
 pub use choice::{Choice, ChoiceKind, Selection};
 pub use error::{Damage, OpenError, ReadError, Shown};
@@ -57,4 +63,8 @@ pub use samples::ByteOrder;
 pub use save::{Compression, SAVED_EXTENSIONS, SaveError, SaveOptions, save};
 
 /// The scalar types that can be read, for messages.
+#[cfg(any(feature = "nifti", feature = "tiff"))]
 pub(crate) const SCALARS: &str = "8, 16 and 32 bit integers, 32 and 64 bit floats are";
+
+/// The stored types that can be read, for messages.
+pub(crate) const STORED_TYPES: &str = "8 to 64 bit integers, 32 and 64 bit floats are";

@@ -1,9 +1,10 @@
 //! How much a file may claim before anything is allocated for it.
 
-use brickfield_core::ScalarType;
 use brickfield_core::glam::UVec3;
+use brickfield_core::{ScalarType, Voxels};
 
-use crate::ReadError;
+use crate::stored_voxel::StoredVoxel;
+use crate::{Note, ReadError};
 
 /// The most that a reader may allocate.
 ///
@@ -26,21 +27,38 @@ impl Default for Limits {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CheckedShape {
     pub(crate) dims: UVec3,
+    /// The type that samples are read into.
     pub(crate) scalar: ScalarType,
+    pub(crate) voxel: StoredVoxel,
+    /// What it was held against.
+    #[cfg_attr(not(feature = "gzip"), allow(dead_code, reason = "only what is packed or in pieces needs it again"))]
+    pub(crate) limits: Limits,
 }
 
 impl CheckedShape {
+    /// One number of each voxel is held, so that the others count for nothing.
+    ///
     /// # Errors
-    /// A dimension outside 1..=u32::MAX, or more bytes than the limit.
-    pub(crate) fn claim(dims: [u64; 3], scalar: ScalarType, limits: &Limits) -> Result<CheckedShape, ReadError> {
+    /// A dimension outside 1..=u32::MAX, too many components, or more bytes than the limit.
+    pub(crate) fn claim(
+        dims: [u64; 3],
+        voxel: impl Into<StoredVoxel>,
+        limits: &Limits,
+    ) -> Result<CheckedShape, ReadError> {
         let mut checked = [0u32; 3];
         for ((out, value), axis) in checked.iter_mut().zip(dims).zip(['x', 'y', 'z']) {
             let in_range = u32::try_from(value).ok().filter(|v| *v >= 1);
             *out = in_range.ok_or_else(|| ReadError::field(format!("dimension {axis}"), value, "1 to 4294967295"))?;
         }
-        let shape = CheckedShape { dims: UVec3::from(checked), scalar };
-        let what = || format!("a volume of {} x {} x {} voxels of {scalar}", dims[0], dims[1], dims[2]);
-        check_bytes(shape.n_voxels_claimed() * scalar.n_bytes() as u128, limits, what)?;
+        let voxel = voxel.into();
+        voxel.check()?;
+        let (stored, scalar) = (voxel.stored, voxel.stored.read_into());
+        let shape = CheckedShape { dims: UVec3::from(checked), scalar, voxel, limits: *limits };
+        let what = |part: &str| format!("{part} of {} x {} x {} voxels of {stored}", dims[0], dims[1], dims[2]);
+        let n_bytes = scalar.n_bytes().max(stored.n_bytes()) as u128;
+        check_bytes(shape.n_voxels_claimed() * n_bytes, limits, || what("a volume"))?;
+        let all = Limits { max_bytes: i64::MAX as u64 };
+        check_bytes(shape.n_voxels_claimed() * voxel.n_bytes() as u128, &all, || what("the components"))?;
         Ok(shape)
     }
 
@@ -52,9 +70,15 @@ impl CheckedShape {
         self.n_voxels_claimed() as usize
     }
 
-    #[cfg(any(feature = "vti", feature = "nifti"))]
-    pub(crate) fn n_bytes(&self) -> u64 {
-        self.n_voxels_claimed() as u64 * self.scalar.n_bytes() as u64
+    /// Bytes of all components in the file.
+    #[cfg(feature = "nifti")]
+    pub(crate) fn n_stored_bytes(&self) -> u64 {
+        self.n_voxels_claimed() as u64 * self.voxel.n_bytes() as u64
+    }
+
+    /// The voxels that were read, in the type that they are to have: see [`StoredType::converted`](crate::stored_type::StoredType::converted).
+    pub(crate) fn converted(&self, voxels: Voxels, notes: &mut Vec<Note>) -> Result<Voxels, ReadError> {
+        self.voxel.stored.converted(voxels, notes)
     }
 }
 
@@ -64,4 +88,16 @@ pub(crate) fn check_bytes(n_bytes: u128, limits: &Limits, what: impl Fn() -> Str
         return Err(ReadError::TooLarge { what: what(), n_bytes, max_bytes: limits.max_bytes });
     }
     Ok(())
+}
+
+/// How many samples axes of these sizes have in all.
+///
+/// # Errors
+/// If 64 bits do not hold their number.
+pub(crate) fn n_samples(field: &'static str, sizes: &[u64]) -> Result<u128, ReadError> {
+    let n = sizes.iter().try_fold(1u64, |n, size| n.checked_mul(*size));
+    n.map(u128::from).ok_or_else(|| {
+        let all: Vec<_> = sizes.iter().map(u64::to_string).collect();
+        ReadError::field(field, all.join(" "), "numbers whose product is below 18446744073709551616")
+    })
 }

@@ -7,8 +7,10 @@ use std::path::Path;
 use crate::error::Shown;
 use crate::files::{open_regular, read_head};
 use crate::folder::visit_files;
-use crate::format::foreign;
-use crate::{Folder, Format, Note, OpenError, OpenOptions, Opened, RawSpec, ReadError, metaimage, nrrd, raw};
+use crate::foreign::{ForeignFormat, after_user_block, foreign};
+use crate::{
+    Folder, Format, Note, OpenError, OpenOptions, Opened, RawSpec, ReadError, metaimage, nrrd, raw, vtk_legacy,
+};
 
 /// Opens a volume: a file, or a folder of DICOM slices, of OME-Zarr, or of pictures.
 ///
@@ -38,17 +40,17 @@ fn read_raw(path: &Path, spec: &RawSpec, options: &OpenOptions) -> Result<Opened
     let head = read_head(&mut file, HEAD_BYTES)?;
     file.rewind().map_err(|e| ReadError::io("the file", e))?;
     let mut opened = raw::read(file, spec, options)?;
-    if let Some(begins_like) = known_start(&head) {
+    if let Some(begins_like) = known_start(&head, path) {
         opened.notes.push(Note::ReadAsRaw { begins_like });
     }
     Ok(opened)
 }
 
 /// The name of the format that begins like this.
-fn known_start(head: &[u8]) -> Option<&'static str> {
+fn known_start(head: &[u8], path: &Path) -> Option<&'static str> {
     let inner = ungzipped(head);
     let format = Format::from_magic(inner.as_deref().unwrap_or(head)).map(Format::name);
-    format.or_else(|| foreign(head))
+    format.or_else(|| foreign(head, path).map(|foreign| foreign.name))
 }
 
 /// The format of a file or folder: by content where it has a magic, else by extension.
@@ -71,14 +73,17 @@ fn detect_file(path: &Path) -> Result<Format, ReadError> {
     if head.is_empty() {
         return Err(ReadError::Empty);
     }
-    if let Some(name) = foreign(&head) {
-        return Err(ReadError::unsupported("format", name, "NRRD, MetaImage, NIfTI, VTI, DICOM, OME-Zarr, TIFF are"));
+    if let Some(ForeignFormat { name, hint }) = foreign(&head, path) {
+        return Err(ReadError::unsupported("format", name, hint));
     }
     let inner = ungzipped(&head);
     match Format::from_magic(inner.as_deref().unwrap_or(&head)) {
         Some(format) if inner.is_none() || format == Format::Nifti => Ok(format),
         Some(format) => Err(ReadError::unsupported("gzip around", format, "around NIfTI it is; unpack it first")),
-        None => Format::from_extension(path).ok_or(ReadError::UnknownFormat { found: Shown::of_bytes(&head) }),
+        None => match after_user_block(&mut file, path)? {
+            Some(ForeignFormat { name, hint }) => Err(ReadError::unsupported("format", name, hint)),
+            None => Format::from_extension(path).ok_or(ReadError::UnknownFormat { found: Shown::of_bytes(&head) }),
+        },
     }
 }
 
@@ -142,7 +147,8 @@ fn open_file(path: &Path, format: Format, options: &OpenOptions) -> Result<Opene
         #[cfg(feature = "nifti")]
         Format::Nifti => crate::nifti::read(file, &stem(path), &folder, options),
         #[cfg(feature = "vti")]
-        Format::Vti => crate::vti::read(file, options),
+        Format::Vti => crate::vti::read(file, &folder, options),
+        Format::VtkLegacy => vtk_legacy::read(file, options),
         // DICOMDIR: what it lists lies beside and below it.
         #[cfg(feature = "dicom")]
         Format::Dicom if crate::dicom::is_index(&file_name(path), &folder, &options.limits) => {

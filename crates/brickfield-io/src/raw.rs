@@ -9,7 +9,6 @@ use brickfield_core::{ScalarType, Volume};
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
 use crate::placement::GridPlacement;
-use crate::samples::allocate;
 use crate::save::{SaveError, save_atomically, values, write_samples};
 use crate::stored::{ByteSkip, DataFile, Encoding, StoredSamples};
 use crate::{ByteOrder, Format, OpenOptions, Opened, ReadError};
@@ -45,11 +44,10 @@ pub fn read(mut input: impl BufRead + Seek, spec: &RawSpec, options: &OpenOption
     let grid = GridPlacement::axis_aligned(spec.spacing, 0.5 * spec.spacing).grid(shape.dims)?;
     let byte_skip = ByteSkip::Bytes(spec.skip_bytes);
     let stored = StoredSamples { encoding: Encoding::Raw, order: spec.order, line_skip: 0, byte_skip };
-    let part = DataFile { name: "the file", n_samples: shape.n_voxels() as u128, n_wanted: shape.n_voxels() };
-    stored.seek_samples(&mut input, &part, spec.scalar.n_bytes())?;
+    let n_voxels = shape.n_voxels();
+    let part = DataFile { name: "the file", n_voxels: n_voxels as u128, n_before: 0, n_wanted: n_voxels };
     let mut found = FileFacts::plain(Format::Raw, options);
-    let mut voxels = allocate(&shape)?;
-    stored.append(&mut voxels, &mut input, &part, &mut found.notes)?;
+    let voxels = stored.read(&mut input, &part, &shape, &mut found.notes)?;
     found.finish(grid, voxels)
 }
 

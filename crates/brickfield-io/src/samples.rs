@@ -6,9 +6,11 @@ use std::str::FromStr;
 use brickfield_core::{Scalar, ScalarType, Voxels, with_voxels};
 
 use crate::ReadError;
+use crate::colour::{ColourPart, luminance};
 #[cfg(feature = "gzip")]
 use crate::error::check_length;
 use crate::limits::CheckedShape;
+use crate::stored_voxel::{StoredVoxel, keep_components};
 
 /// Which end of a number comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -70,15 +72,25 @@ pub(crate) fn allocate(shape: &CheckedShape) -> Result<Voxels, ReadError> {
     }
 }
 
-/// Appends `n` binary samples; `what` names the source in errors.
+/// Appends `n` zeros.
+#[cfg(any(feature = "tiff", feature = "vti"))]
+pub(crate) fn append_zeros(voxels: &mut Voxels, n: usize) {
+    fn append<T: Scalar>(values: &mut Vec<T>, n: usize) {
+        values.resize(values.len() + n, T::from_f64(0.0));
+    }
+    with_voxels!(voxels, v => append(v, n));
+}
+
+/// Appends the part that is read of `n` binary voxels; `what` names the source in errors.
 pub(crate) fn append_binary(
     voxels: &mut Voxels,
     reader: &mut dyn Read,
     n: usize,
+    voxel: impl Into<StoredVoxel>,
     order: ByteOrder,
     what: &str,
 ) -> Result<(), ReadError> {
-    with_voxels!(voxels, v => append_binary_as(v, reader, n, order, what))
+    with_voxels!(voxels, v => append_binary_as(v, reader, n, voxel.into(), order, what))
 }
 
 const CHUNK_BYTES: usize = 1 << 18;
@@ -87,25 +99,51 @@ fn append_binary_as<T: FileScalar>(
     out: &mut Vec<T>,
     reader: &mut dyn Read,
     n: usize,
+    voxel: StoredVoxel,
     order: ByteOrder,
     what: &str,
 ) -> Result<(), ReadError> {
-    let expected_bytes = n * size_of::<T>();
-    let mut chunk = vec![0; CHUNK_BYTES.min(expected_bytes)];
+    let expected_bytes = n * voxel.n_bytes();
+    // Whole voxels; at least one, for MAX_COMPONENTS of the widest samples are one chunk.
+    let chunk_bytes = CHUNK_BYTES / voxel.n_bytes() * voxel.n_bytes();
+    let mut chunk = vec![0; chunk_bytes.min(expected_bytes)];
     let mut n_bytes = 0;
     while n_bytes < expected_bytes {
-        let piece = &mut chunk[..CHUNK_BYTES.min(expected_bytes - n_bytes)];
+        let piece = &mut chunk[..chunk_bytes.min(expected_bytes - n_bytes)];
         let mut n_read = 0;
         let outcome = fill_counted(reader, piece, &mut n_read);
         n_bytes += n_read;
         outcome.map_err(|e| ReadError::reading(what, n_bytes as u64, expected_bytes as u128, e))?;
-        T::append(&piece[..n_read], order, out);
         if n_read < piece.len() {
             let (n_bytes, expected_bytes) = (n_bytes as u64, expected_bytes as u128);
             return Err(ReadError::Truncated { what: what.to_owned(), n_bytes, expected_bytes });
         }
+        append_piece(out, piece, voxel, order, what)?;
     }
     Ok(())
+}
+
+/// Appends the part that is read of whole voxels.
+fn append_piece<T: FileScalar>(
+    out: &mut Vec<T>,
+    piece: &mut [u8],
+    voxel: StoredVoxel,
+    order: ByteOrder,
+    what: &str,
+) -> Result<(), ReadError> {
+    let stored = voxel.stored;
+    let n_kept = keep_components(piece, voxel.n_components as usize, stored.n_bytes(), voxel.kept());
+    let kept = &piece[..n_kept];
+    match voxel.part {
+        ColourPart::Channel(_) => stored.append(kept, order, out).map_err(|e| e.of_sample(out.len(), what)),
+        ColourPart::Luminance => {
+            let mut colours: Vec<T> = with_room(n_kept / stored.n_bytes())?;
+            let outcome = stored.append(kept, order, &mut colours);
+            outcome.map_err(|e| e.of_sample(3 * out.len() + colours.len(), what))?;
+            out.extend(colours.as_chunks::<3>().0.iter().map(|rgb| luminance(*rgb)));
+            Ok(())
+        }
+    }
 }
 
 /// Reads until the buffer is full or the source ends; bytes read.
@@ -154,43 +192,64 @@ pub(crate) fn skip(reader: &mut dyn Read, n_bytes: u64, what: &str) -> Result<()
     Ok(())
 }
 
-/// Appends `n` samples written as text between white space or commas; `what` names the source in errors.
+/// Appends the part that is read of `n` voxels written as text, with white space or commas between numbers; `what` names
+/// the source in errors.
 pub(crate) fn append_text(
     voxels: &mut Voxels,
     reader: &mut dyn BufRead,
     n: usize,
+    voxel: impl Into<StoredVoxel>,
     what: &str,
 ) -> Result<(), ReadError> {
-    with_voxels!(voxels, v => append_text_as(v, reader, n, what))
+    with_voxels!(voxels, v => append_text_as(v, reader, n, voxel.into(), what))
 }
 
 fn append_text_as<T: FileScalar>(
     out: &mut Vec<T>,
     reader: &mut dyn BufRead,
     n: usize,
+    voxel: StoredVoxel,
     what: &str,
 ) -> Result<(), ReadError> {
+    let n_components = voxel.n_components as usize;
+    let (mut token, mut kept) = (Vec::new(), Vec::new());
+    for i in 0..n {
+        kept.clear();
+        for component in 0..n_components {
+            let sample = i * n_components + component;
+            next_token(reader, &mut token).map_err(|e| ReadError::io(what, e))?;
+            if token.is_empty() {
+                let expected = n * n_components;
+                return Err(ReadError::TooFewSamples { what: what.to_owned(), found: sample, expected });
+            }
+            if voxel.kept().contains(&component) {
+                kept.push(parse::<T>(&token, voxel, sample)?);
+            }
+        }
+        out.push(match *kept {
+            [red, green, blue] => luminance([red, green, blue]),
+            _ => kept[0],
+        });
+    }
+    Ok(())
+}
+
+fn parse<T: FileScalar>(token: &[u8], voxel: StoredVoxel, sample: usize) -> Result<T, ReadError> {
+    let text = String::from_utf8_lossy(token);
+    let bad = || ReadError::field(format!("sample {sample}"), &text, voxel.stored.expected_text());
+    voxel.stored.parse(&text).ok_or_else(bad)
+}
+
+/// Passes over `n` samples written as text; `what` names the source in errors.
+pub(crate) fn skip_text(reader: &mut dyn BufRead, n: usize, what: &str) -> Result<(), ReadError> {
     let mut token = Vec::new();
     for i in 0..n {
         next_token(reader, &mut token).map_err(|e| ReadError::io(what, e))?;
         if token.is_empty() {
             return Err(ReadError::TooFewSamples { what: what.to_owned(), found: i, expected: n });
         }
-        let text = String::from_utf8_lossy(&token);
-        let expected = || format!("a number that fits {}", T::TYPE);
-        let value = parse::<T>(&text).ok_or_else(|| ReadError::field(format!("sample {i}"), &text, expected()))?;
-        out.push(value);
     }
     Ok(())
-}
-
-/// The number, also where an integer is written as a float ("3.0").
-fn parse<T: FileScalar>(text: &str) -> Option<T> {
-    text.parse().ok().or_else(|| {
-        let wide: f64 = text.parse().ok()?;
-        let value = T::from_f64(wide);
-        (value.to_f64() == wide).then_some(value)
-    })
 }
 
 const MAX_TOKEN_BYTES: usize = 400;
@@ -215,6 +274,6 @@ fn next_token(reader: &mut dyn BufRead, token: &mut Vec<u8>) -> std::io::Result<
 }
 
 /// Least bytes in which `n` numbers can be written as text.
-pub(crate) fn least_text_bytes(n: usize) -> u128 {
-    (2 * n as u128).saturating_sub(1)
+pub(crate) fn least_text_bytes(n: u128) -> u128 {
+    n.saturating_mul(2).saturating_sub(1)
 }

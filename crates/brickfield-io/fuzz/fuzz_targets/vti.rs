@@ -2,9 +2,12 @@
 
 use std::io::Cursor;
 
-use brickfield_io::{Limits, vti};
+use brickfield_io::{Limits, NoFiles, vti};
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|bytes: &[u8]| {
-    let _ = vti::read(Cursor::new(bytes), &Limits { max_bytes: 1 << 20 }.into());
+#[path = "panics.rs"]
+mod panics;
+
+fuzz_target!(init: panics::abort_on_ours(), |bytes: &[u8]| {
+    let _ = vti::read(Cursor::new(bytes), &NoFiles, &Limits { max_bytes: 1 << 20 }.into());
 });

@@ -52,7 +52,7 @@ fn frame_voxels(
     let n_samples = image.n_stored_samples() as usize;
     let shape = CheckedShape::claim([n_samples as u64, 1, 1], image.scalar, limits)?;
     let mut samples = allocate(&shape)?;
-    append_binary(&mut samples, &mut bytes.as_slice(), n_samples, ByteOrder::Little, &image.name)?;
+    append_binary(&mut samples, &mut bytes.as_slice(), n_samples, image.scalar, ByteOrder::Little, &image.name)?;
     keep_stored_bits(&mut samples, n_samples, image.bits);
     match image.colour.is_grey() {
         true => Ok(samples),

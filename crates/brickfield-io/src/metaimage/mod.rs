@@ -1,7 +1,7 @@
 //! MetaImage, .mha and .mhd (MetaIO documentation, itk.org/Wiki/ITK/MetaIO/Documentation).
 //!
-//! Data LOCAL, in one file, a LIST or a pattern; binary, zlib and text; both byte orders; HeaderSize.
-//! Not: more than one value per voxel. CenterOfRotation is ignored, as ITK does.
+//! Data LOCAL, in one file, a LIST or a pattern; binary, zlib and text; both byte orders; HeaderSize. Of several values
+//! per voxel, and of a series, one is read. CenterOfRotation is ignored, as ITK does.
 
 mod write;
 
@@ -10,20 +10,24 @@ pub use write::{save, write};
 use std::collections::BTreeMap;
 use std::io::{BufRead, Seek};
 
+use brickfield_core::ScalarType;
 use brickfield_core::glam::DVec3;
-use brickfield_core::{ScalarType, Voxels};
 
-use crate::detached::read_detached;
+use crate::choice::Entries;
+use crate::colour::Colours;
+use crate::detached::{Promised, read_detached};
 use crate::error::{Shown, counted};
 use crate::file_list::FileNames;
 use crate::files::ByteSource;
-use crate::limits::CheckedShape;
+use crate::limits::{CheckedShape, n_samples};
 use crate::lines::{HeaderLines, numbers};
 use crate::opened::FileFacts;
 use crate::placement::{AXES, GridPlacement, usable_spacing};
-use crate::samples::allocate;
-use crate::stored::{ByteSkip, DataFile, Encoding, StoredSamples};
-use crate::{ByteOrder, DataFiles, Format, Note, OpenOptions, Opened, ReadError, WorldFrame};
+use crate::series::{OuterAxis, choose_volume};
+use crate::stored::{ByteSkip, Encoding, StoredSamples};
+use crate::stored_type::StoredType;
+use crate::stored_voxel::{MAX_COMPONENTS, StoredVoxel};
+use crate::{ByteOrder, ChoiceKind, DataFiles, Format, Note, OpenOptions, Opened, ReadError, WorldFrame};
 
 /// Reads a MetaImage from its header on; `files` finds detached data.
 ///
@@ -38,32 +42,20 @@ pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, options: &Ope
 
 fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
     let header = MetaHeader::read(source)?;
-    let scalar = header.scalar()?;
     let stored = header.stored()?;
     let mut found = FileFacts::plain(Format::MetaImage, options);
-    let shape = CheckedShape::claim(header.volume_dims(&mut found.notes), scalar, &options.limits)?;
+    let voxel = header.voxel(&mut found)?;
+    let n_before = header.n_volumes_before(&mut found)?;
+    let shape = CheckedShape::claim(header.volume_dims(), voxel, &options.limits)?;
     let grid = header.placement(&mut found.notes)?.grid(shape.dims)?;
+    let n_before = n_before * shape.n_voxels() as u128;
+    let promised = Promised { n_voxels: n_samples("DimSize", &header.sizes)?, n_before };
     let voxels = match &header.data {
-        Some(names) => read_detached(names, header.n_samples(), &shape, &stored, files, &mut found.notes)?,
-        None => read_local(source, &header, &shape, &stored, &mut found.notes)?,
+        Some(names) => read_detached(names, promised, &shape, &stored, files, &mut found.notes)?,
+        None => stored.read(source, &promised.attached(&shape), &shape, &mut found.notes)?,
     };
     found.frame = header.frame();
     found.finish(grid, voxels)
-}
-
-fn read_local(
-    source: &mut dyn ByteSource,
-    header: &MetaHeader,
-    shape: &CheckedShape,
-    stored: &StoredSamples,
-    notes: &mut Vec<Note>,
-) -> Result<Voxels, ReadError> {
-    let part =
-        DataFile { name: "the data after the header", n_samples: header.n_samples(), n_wanted: shape.n_voxels() };
-    stored.seek_samples(source, &part, shape.scalar.n_bytes())?;
-    let mut voxels = allocate(shape)?;
-    stored.append(&mut voxels, source, &part, notes)?;
-    Ok(voxels)
 }
 
 struct MetaHeader {
@@ -79,12 +71,27 @@ const MAX_AXES: usize = 10;
 const FIRST_KEYS: [&str; 8] =
     ["objecttype", "ndims", "comment", "name", "id", "objectsubtype", "transformtype", "binarydata"];
 
-/// Whether this is how a MetaImage begins: a known key, then `=`.
+/// Whether this is how a MetaImage begins: a known key, then `=`; or any keys up to one that is in every MetaImage.
 pub(crate) fn has_magic(head: &[u8]) -> bool {
-    let line = head.split(|b| *b == b'\n').next().unwrap_or(&[]);
-    let Some(end) = line.iter().position(|b| *b == b'=') else { return false };
-    let key = String::from_utf8_lossy(&line[..end]).trim().to_ascii_lowercase();
-    FIRST_KEYS.contains(&key.as_str())
+    for (i, line) in head.split(|b| *b == b'\n').enumerate() {
+        let line = String::from_utf8_lossy(line);
+        let Some((key, separator, _)) = parted(&line) else { return false };
+        match key.as_str() {
+            "objecttype" | "ndims" => return true,
+            key if i == 0 && separator == '=' && FIRST_KEYS.contains(&key) => return true,
+            _ => {}
+        }
+    }
+    false
+}
+
+/// Key in lower case, separator and value of a line: `Key = value` or `Key: value`.
+fn parted(line: &str) -> Option<(String, char, &str)> {
+    let at = line.find(['=', ':'])?;
+    let key = line[..at].trim().to_ascii_lowercase();
+    let is_key =
+        !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.' | '|'));
+    is_key.then(|| (key, if line[at..].starts_with('=') { '=' } else { ':' }, line[at + 1..].trim()))
 }
 
 impl MetaHeader {
@@ -94,17 +101,19 @@ impl MetaHeader {
         let mut fields = BTreeMap::new();
         let mut is_first = true;
         while let Some(line) = lines.next_line()? {
-            if std::mem::take(&mut is_first) && !has_magic(line.as_bytes()) {
-                return Err(wrong_magic(&line));
-            }
-            let Some((key, value)) = line.split_once('=') else { continue };
-            let (key, value) = (key.trim().to_ascii_lowercase(), value.trim().to_owned());
+            let is_first = std::mem::take(&mut is_first);
+            let Some((key, _, value)) = parted(&line) else {
+                if is_first {
+                    return Err(wrong_magic(&line));
+                }
+                continue;
+            };
             if key == "elementdatafile" {
                 let sizes = read_sizes(&fields)?;
-                let data = file_names(&value, &sizes, &mut lines)?;
+                let data = file_names(value, &sizes, &mut lines)?;
                 return Ok(MetaHeader { fields, sizes, data });
             }
-            fields.insert(key, value);
+            fields.insert(key, value.to_owned());
         }
         Err(ReadError::Missing { field: "ElementDataFile" })
     }
@@ -117,16 +126,9 @@ impl MetaHeader {
         self.text(keys).is_some_and(|v| matches!(v.as_bytes(), [b'T' | b't' | b'1' | b'Y' | b'y', ..]))
     }
 
-    fn n_samples(&self) -> u128 {
-        self.sizes.iter().fold(1u128, |n, s| n.saturating_mul(u128::from(*s)))
-    }
-
-    fn scalar(&self) -> Result<ScalarType, ReadError> {
-        if let Some(channels) = self.text(&["elementnumberofchannels"]).filter(|v| *v != "1") {
-            return Err(ReadError::unsupported("ElementNumberOfChannels", channels, "1 is"));
-        }
+    fn stored_type(&self) -> Result<StoredType, ReadError> {
         let name = self.text(&["elementtype"]).ok_or(ReadError::Missing { field: "ElementType" })?;
-        Ok(match name {
+        let scalar = match name {
             "MET_UCHAR" => ScalarType::U8,
             "MET_CHAR" => ScalarType::I8,
             "MET_USHORT" => ScalarType::U16,
@@ -135,8 +137,11 @@ impl MetaHeader {
             "MET_INT" | "MET_LONG" => ScalarType::I32,
             "MET_FLOAT" => ScalarType::F32,
             "MET_DOUBLE" => ScalarType::F64,
-            _ => return Err(ReadError::unsupported("ElementType", name, crate::SCALARS)),
-        })
+            "MET_LONG_LONG" => return Ok(StoredType::I64),
+            "MET_ULONG_LONG" => return Ok(StoredType::U64),
+            _ => return Err(ReadError::unsupported("ElementType", name, crate::STORED_TYPES)),
+        };
+        Ok(scalar.into())
     }
 
     fn stored(&self) -> Result<StoredSamples, ReadError> {
@@ -169,11 +174,32 @@ impl MetaHeader {
         }
     }
 
-    fn volume_dims(&self, notes: &mut Vec<Note>) -> [u64; 3] {
-        for (axis, n_entries) in self.sizes.iter().enumerate().skip(3).filter(|(_, n)| **n > 1) {
-            notes.push(Note::FirstOfAxis { axis: axis.to_string(), n_entries: *n_entries });
+    /// Three or four unsigned numbers are colours, others are components.
+    fn voxel(&self, found: &mut FileFacts) -> Result<StoredVoxel, ReadError> {
+        let stored = self.stored_type()?;
+        let text = self.text(&["elementnumberofchannels"]).unwrap_or("1");
+        let bad = || ReadError::field("ElementNumberOfChannels", text, format!("1 to {MAX_COMPONENTS}"));
+        let n_components: u64 = text.parse().ok().filter(|n| (1..=MAX_COMPONENTS).contains(n)).ok_or_else(bad)?;
+        let is_colour = matches!(stored, StoredType::Scalar(ScalarType::U8 | ScalarType::U16));
+        match Colours::of_channels(n_components).filter(|_| is_colour) {
+            _ if n_components == 1 => Ok(stored.into()),
+            Some(colours) => StoredVoxel::of_colours(stored, colours, found),
+            None => StoredVoxel::of_components(stored, ChoiceKind::Channel, Entries::Numbered(n_components), found),
         }
+    }
+
+    fn volume_dims(&self) -> [u64; 3] {
         [0, 1, 2].map(|axis| self.sizes.get(axis).copied().unwrap_or(1))
+    }
+
+    /// The fourth axis is time.
+    fn n_volumes_before(&self, found: &mut FileFacts) -> Result<u128, ReadError> {
+        let outer = self.sizes.iter().enumerate().skip(3).map(|(axis, n_entries)| OuterAxis {
+            name: axis.to_string(),
+            n_entries: *n_entries,
+            kind: (axis == 3).then_some(ChoiceKind::Time),
+        });
+        choose_volume(outer.collect(), found)
     }
 
     fn placement(&self, notes: &mut Vec<Note>) -> Result<GridPlacement, ReadError> {

@@ -151,9 +151,9 @@ fn read_image(
     check_bytes(u128::from(at.offset), &options.limits, || "the space before vox_offset".to_owned())?;
     skip(&mut stream.reader, at.offset - at.n_read, "the space before vox_offset")?;
     let mut voxels = allocate(&shape)?;
-    append_binary(&mut voxels, &mut stream.reader, shape.n_voxels(), order(header), "the image")?;
+    append_binary(&mut voxels, &mut stream.reader, shape.n_voxels(), shape.voxel, order(header), "the image")?;
     if stream.is_gzip && n_all == shape.n_voxels() as u128 {
-        crate::deflate::check_end(&mut stream.reader, "the image", shape.n_bytes(), &mut found.notes)?;
+        crate::deflate::check_end(&mut stream.reader, "the image", shape.n_stored_bytes(), &mut found.notes)?;
     }
     (found.frame, found.unit) = (frame, unit(header));
     found.finish_rescaled(grid, voxels, rescale)

@@ -7,16 +7,22 @@ use brickfield_core::ScalarType;
 use crate::error::{Shown, counted};
 use crate::file_list::FileNames;
 use crate::files::ByteSource;
+use crate::limits::n_samples;
 use crate::lines::{HeaderLines, numbers};
 use crate::stored::{ByteSkip, Encoding, StoredSamples};
+use crate::stored_type::StoredType;
 use crate::{ByteOrder, Format, ReadError};
 
+#[derive(Default)]
 /// Field names are in lower case and without spaces, so that "data file" and "datafile" are one.
 pub(super) struct NrrdHeader {
     fields: BTreeMap<String, String>,
+    /// Key/value pairs, as they are written.
+    keys: BTreeMap<String, String>,
     data_files: Vec<String>,
     /// Samples along each axis of the file, fastest first.
     pub(super) sizes: Vec<u64>,
+    pub(super) n_samples: u128,
 }
 
 const MAX_AXES: usize = 16;
@@ -26,7 +32,7 @@ impl NrrdHeader {
     pub(super) fn read(source: &mut dyn ByteSource) -> Result<NrrdHeader, ReadError> {
         let mut lines = HeaderLines::new(source);
         check_magic(&lines.next_line()?.unwrap_or_default())?;
-        let mut header = NrrdHeader { fields: BTreeMap::new(), data_files: Vec::new(), sizes: Vec::new() };
+        let mut header = NrrdHeader::default();
         while let Some(line) = lines.next_line()? {
             if line.is_empty() {
                 break;
@@ -38,15 +44,18 @@ impl NrrdHeader {
             }
         }
         header.sizes = header.read_sizes()?;
+        header.n_samples = n_samples("sizes", &header.sizes)?;
         Ok(header)
     }
 
-    /// Comments, key/value pairs (`:=`) and lines of neither kind are passed over.
+    /// Comments, and lines that have neither a field nor a key, are passed over.
     fn add(&mut self, line: &str) {
-        if line.starts_with('#') || line.contains(":=") {
+        if line.starts_with('#') {
             return;
         }
-        if let Some((name, value)) = line.split_once(':') {
+        if let Some((key, value)) = line.split_once(":=") {
+            self.keys.insert(key.to_owned(), value.to_owned());
+        } else if let Some((name, value)) = line.split_once(':') {
             let name = name.to_ascii_lowercase().replace(' ', "");
             self.fields.insert(name, value.trim().to_owned());
         }
@@ -54,6 +63,14 @@ impl NrrdHeader {
 
     pub(super) fn text(&self, name: &str) -> Option<&str> {
         self.fields.get(name).map(String::as_str)
+    }
+
+    pub(super) fn key(&self, name: &str) -> Option<&str> {
+        self.keys.get(name).map(String::as_str)
+    }
+
+    pub(super) fn kind(&self, axis: usize) -> Option<&str> {
+        self.text("kinds")?.split_whitespace().nth(axis)
     }
 
     fn required(&self, name: &str, field: &'static str) -> Result<&str, ReadError> {
@@ -82,13 +99,9 @@ impl NrrdHeader {
         Ok(sizes)
     }
 
-    pub(super) fn n_samples(&self) -> u128 {
-        self.sizes.iter().fold(1u128, |n, s| n.saturating_mul(u128::from(*s)))
-    }
-
-    pub(super) fn scalar(&self) -> Result<ScalarType, ReadError> {
+    pub(super) fn stored_type(&self) -> Result<StoredType, ReadError> {
         let name = self.required("type", "type")?.to_ascii_lowercase();
-        Ok(match name.as_str() {
+        let scalar = match name.as_str() {
             "signed char" | "int8" | "int8_t" => ScalarType::I8,
             "uchar" | "unsigned char" | "uint8" | "uint8_t" => ScalarType::U8,
             "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => ScalarType::I16,
@@ -97,17 +110,28 @@ impl NrrdHeader {
             "uint" | "unsigned int" | "uint32" | "uint32_t" => ScalarType::U32,
             "float" => ScalarType::F32,
             "double" => ScalarType::F64,
-            _ => return Err(ReadError::unsupported("type", name, crate::SCALARS)),
-        })
+            "longlong"
+            | "long long"
+            | "long long int"
+            | "signed long long"
+            | "signed long long int"
+            | "int64"
+            | "int64_t" => return Ok(StoredType::I64),
+            "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => {
+                return Ok(StoredType::U64);
+            }
+            _ => return Err(ReadError::unsupported("type", name, crate::STORED_TYPES)),
+        };
+        Ok(scalar.into())
     }
 
-    pub(super) fn stored(&self, scalar: ScalarType) -> Result<StoredSamples, ReadError> {
+    pub(super) fn stored(&self, stored: StoredType) -> Result<StoredSamples, ReadError> {
         let encoding = self.encoding()?;
         let order = match self.text("endian").map(str::to_ascii_lowercase).as_deref() {
             Some("little") => ByteOrder::Little,
             Some("big") => ByteOrder::Big,
             Some(other) => return Err(ReadError::field("endian", other, "little or big")),
-            None if scalar.n_bytes() == 1 || encoding == Encoding::Text => ByteOrder::Little,
+            None if stored.n_bytes() == 1 || encoding == Encoding::Text => ByteOrder::Little,
             None => return Err(ReadError::Missing { field: "endian" }),
         };
         Ok(StoredSamples { encoding, order, line_skip: self.line_skip()?, byte_skip: self.byte_skip()? })

@@ -1,9 +1,11 @@
 //! NRRD, attached and detached (Kindlmann, "Definition of NRRD file format", teem.sourceforge.net/nrrd/format.html).
 //!
 //! Encodings raw, ascii and gzip, both byte orders, line and byte skip, data files as one name, a list or a pattern.
-//! Not: bzip2 and hex; more than one value per voxel.
+//! Voxels of several numbers, series, layers of segmentations: one of them is read. Not: bzip2 and hex.
 
+mod axes;
 mod header;
+mod segments;
 mod space;
 mod write;
 
@@ -11,13 +13,12 @@ pub use write::{save, write};
 
 use std::io::{BufRead, Seek};
 
-use crate::detached::read_detached;
+use crate::detached::{Promised, read_detached};
 use crate::files::ByteSource;
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
-use crate::samples::allocate;
-use crate::stored::DataFile;
 use crate::{DataFiles, Format, OpenOptions, Opened, ReadError};
+use axes::Part;
 use header::NrrdHeader;
 use space::Space;
 
@@ -34,22 +35,17 @@ pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, options: &Ope
 
 fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
     let header = NrrdHeader::read(source)?;
-    let scalar = header.scalar()?;
-    let stored = header.stored(scalar)?;
+    let stored_type = header.stored_type()?;
+    let stored = header.stored(stored_type)?;
     let mut found = FileFacts::plain(Format::Nrrd, options);
     let space = Space::of(&header, &mut found.notes)?;
-    let shape = CheckedShape::claim(space.dims, scalar, &options.limits)?;
+    let Part { voxel, n_before } = Part::choose(&header, &space.axes, stored_type, &mut found)?;
+    let shape = CheckedShape::claim(space.dims, voxel, &options.limits)?;
     let grid = space.placement.grid(shape.dims)?;
+    let promised = Promised { n_voxels: header.n_samples / u128::from(voxel.n_components), n_before };
     let voxels = match header.file_names()? {
-        Some(names) => read_detached(&names, header.n_samples(), &shape, &stored, files, &mut found.notes)?,
-        None => {
-            let n_wanted = shape.n_voxels();
-            let part = DataFile { name: "the data after the header", n_samples: header.n_samples(), n_wanted };
-            stored.seek_samples(source, &part, scalar.n_bytes())?;
-            let mut voxels = allocate(&shape)?;
-            stored.append(&mut voxels, source, &part, &mut found.notes)?;
-            voxels
-        }
+        Some(names) => read_detached(&names, promised, &shape, &stored, files, &mut found.notes)?,
+        None => stored.read(source, &promised.attached(&shape), &shape, &mut found.notes)?,
     };
     (found.frame, found.unit) = (space.frame, space.unit);
     found.finish(grid, voxels)

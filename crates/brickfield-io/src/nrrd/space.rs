@@ -10,6 +10,8 @@ use crate::{Note, ReadError, WorldFrame};
 /// Which axes of the file are the volume's, and where they lie in the world.
 pub(super) struct Space {
     pub(super) dims: [u64; 3],
+    /// The axes of the file that are the volume's.
+    pub(super) axes: Vec<usize>,
     pub(super) placement: GridPlacement,
     pub(super) frame: WorldFrame,
     pub(super) unit: Option<String>,
@@ -18,7 +20,7 @@ pub(super) struct Space {
 impl Space {
     pub(super) fn of(header: &NrrdHeader, notes: &mut Vec<Note>) -> Result<Space, ReadError> {
         let directions = directions(header)?;
-        let axes = volume_axes(header, &directions, notes)?;
+        let axes = volume_axes(header, &directions);
         let mut dims = [1; 3];
         for (dim, axis) in dims.iter_mut().zip(&axes) {
             *dim = header.sizes[*axis];
@@ -28,7 +30,7 @@ impl Space {
             Some(directions) => oriented(header, directions, &axes)?,
             None => by_spacings(header, &axes, notes)?,
         };
-        Ok(Space { dims, placement: placement.scaled(factors), frame, unit: unit(header, &axes) })
+        Ok(Space { dims, placement: placement.scaled(factors), frame, unit: unit(header, &axes), axes })
     }
 }
 
@@ -67,16 +69,11 @@ fn vectors(field: &'static str, text: &str) -> Result<Directions, ReadError> {
     Ok(vectors)
 }
 
-/// The up to three axes that make the volume. Of slower ones the first entry is taken; faster ones are an error.
-fn volume_axes(
-    header: &NrrdHeader,
-    directions: &Option<Directions>,
-    notes: &mut Vec<Note>,
-) -> Result<Vec<usize>, ReadError> {
-    let kinds: Vec<&str> = header.text("kinds").unwrap_or("").split_whitespace().collect();
-    let is_spatial = |axis: usize| match (directions, kinds.get(axis)) {
+/// The up to three axes that make the volume.
+fn volume_axes(header: &NrrdHeader, directions: &Option<Directions>) -> Vec<usize> {
+    let is_spatial = |axis: usize| match (directions, header.kind(axis)) {
         (Some(d), _) => d[axis].is_some(),
-        (None, Some(kind)) => matches!(*kind, "domain" | "space" | "???" | "none"),
+        (None, Some(kind)) => matches!(kind, "domain" | "space" | "???" | "none"),
         (None, None) => true,
     };
     let mut axes: Vec<usize> = (0..header.sizes.len()).filter(|axis| is_spatial(*axis)).collect();
@@ -86,30 +83,7 @@ fn volume_axes(
             None => axes.truncate(3),
         }
     }
-    for axis in 0..header.sizes.len() {
-        check_left_out(header, axis, &axes, &kinds, notes)?;
-    }
-    Ok(axes)
-}
-
-fn check_left_out(
-    header: &NrrdHeader,
-    axis: usize,
-    volume_axes: &[usize],
-    kinds: &[&str],
-    notes: &mut Vec<Note>,
-) -> Result<(), ReadError> {
-    let n_entries = header.sizes[axis];
-    if volume_axes.contains(&axis) || n_entries == 1 {
-        return Ok(());
-    }
-    let name = format!("{axis} ({})", kinds.get(axis).unwrap_or(&"no kind"));
-    if volume_axes.iter().any(|a| *a > axis) {
-        let value = format!("{n_entries} along axis {name}");
-        return Err(ReadError::unsupported("number of components", value, "1 per voxel is"));
-    }
-    notes.push(Note::FirstOfAxis { axis: name, n_entries });
-    Ok(())
+    axes
 }
 
 /// The frame, and the factors that bring the file's axes to it.

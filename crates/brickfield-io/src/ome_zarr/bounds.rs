@@ -21,9 +21,20 @@ pub(super) enum Compressor {
     Blosc,
 }
 
+/// The one compressor of some bytes, and the checksums in it and around it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Codecs {
+    compressor: Compressor,
+    n_inner_checksums: u64,
+    n_outer_checksums: u64,
+}
+
+/// CRC-32C stands behind the bytes.
+const CHECKSUM_BYTES: u64 = 4;
+
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Packing {
-    Plain(Compressor),
+    Plain(Codecs),
     Shard(Shard),
 }
 
@@ -31,7 +42,7 @@ pub(super) enum Packing {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Shard {
     part_shape: Vec<u64>,
-    compressor: Compressor,
+    codecs: Codecs,
     is_index_first: bool,
     index_has_checksum: bool,
 }
@@ -49,23 +60,28 @@ impl Compressor {
 }
 
 impl Packing {
-    pub(super) fn of_v2(compressor: &Value) -> Result<Packing, ReadError> {
-        match compressor {
-            Value::Null => Ok(Packing::Plain(Compressor::None)),
-            other => Ok(Packing::Plain(Compressor::named(other["id"].as_str().unwrap_or_default())?)),
+    pub(super) fn of_v2(array: &Value) -> Result<Packing, ReadError> {
+        let mut filters = array["filters"].as_array().into_iter().flatten();
+        if let Some(filter) = filters.next() {
+            return Err(ReadError::unsupported("filter", filter["id"].as_str().unwrap_or_default(), "none is"));
         }
+        let compressor = match &array["compressor"] {
+            Value::Null => Compressor::None,
+            other => Compressor::named(other["id"].as_str().unwrap_or_default())?,
+        };
+        Ok(Packing::Plain(Codecs { compressor, n_inner_checksums: 0, n_outer_checksums: 0 }))
     }
 
     pub(super) fn of_v3(codecs: &Value) -> Result<Packing, ReadError> {
         let first = codecs.as_array().and_then(|list| list.first());
         let Some(shard) = first.filter(|codec| codec["name"] == "sharding_indexed") else {
-            return Ok(Packing::Plain(compressor_of(codecs)?));
+            return Ok(Packing::Plain(Codecs::of(codecs)?));
         };
         let configuration = &shard["configuration"];
         let index_codecs = configuration["index_codecs"].as_array().into_iter().flatten();
         Ok(Packing::Shard(Shard {
             part_shape: numbers(configuration, "chunk_shape")?,
-            compressor: compressor_of(&configuration["codecs"])?,
+            codecs: Codecs::of(&configuration["codecs"])?,
             is_index_first: configuration["index_location"] == "start",
             index_has_checksum: index_codecs.clone().any(|codec| codec["name"] == "crc32c"),
         }))
@@ -81,12 +97,12 @@ impl Packing {
     ) -> Result<(), ReadError> {
         let n_bytes = |shape: &[u64]| shape.iter().fold(sample_bytes, |n, s| n.saturating_mul(*s));
         match self {
-            Packing::Plain(compressor) => check_stream(*compressor, stored, n_bytes(chunk_shape), what),
+            Packing::Plain(codecs) => check_stream(*codecs, stored, n_bytes(chunk_shape), what),
             Packing::Shard(shard) => {
                 let parts = shard.parts(stored, chunk_shape, what)?;
                 for (i, part) in parts.iter().enumerate() {
                     let what = format!("part {} of {} of {what}", i + 1, parts.len());
-                    check_stream(shard.compressor, part, n_bytes(&shard.part_shape), &what)?;
+                    check_stream(shard.codecs, part, n_bytes(&shard.part_shape), &what)?;
                 }
                 Ok(())
             }
@@ -94,20 +110,22 @@ impl Packing {
     }
 }
 
-/// The one compressor among codecs that change no lengths.
-fn compressor_of(codecs: &Value) -> Result<Compressor, ReadError> {
-    let mut found = Compressor::None;
-    for codec in codecs.as_array().into_iter().flatten() {
-        let name = codec["name"].as_str().unwrap_or_default();
-        if matches!(name, "bytes" | "endian" | "transpose" | "crc32c") {
-            continue;
+impl Codecs {
+    /// One compressor at most; all other codecs but checksums change no lengths.
+    fn of(codecs: &Value) -> Result<Codecs, ReadError> {
+        let mut found = Codecs { compressor: Compressor::None, n_inner_checksums: 0, n_outer_checksums: 0 };
+        for codec in codecs.as_array().into_iter().flatten() {
+            let name = codec.as_str().or(codec["name"].as_str()).unwrap_or_default();
+            match (name, found.compressor) {
+                ("bytes" | "endian" | "transpose", _) => {}
+                ("crc32c", Compressor::None) => found.n_inner_checksums += 1,
+                ("crc32c", _) => found.n_outer_checksums += 1,
+                (_, Compressor::None) => found.compressor = Compressor::named(name)?,
+                _ => return Err(ReadError::unsupported("second compressor", name, "one is")),
+            }
         }
-        if found != Compressor::None {
-            return Err(ReadError::unsupported("second compressor", name, "one is"));
-        }
-        found = Compressor::named(name)?;
+        Ok(found)
     }
-    Ok(found)
 }
 
 impl Shard {
@@ -151,8 +169,11 @@ impl Shard {
     }
 }
 
-fn check_stream(compressor: Compressor, stored: &[u8], max_bytes: u64, what: &str) -> Result<(), ReadError> {
-    let unpacked = match compressor {
+fn check_stream(codecs: Codecs, stored: &[u8], max_bytes: u64, what: &str) -> Result<(), ReadError> {
+    let n_packed = (stored.len() as u64).saturating_sub(CHECKSUM_BYTES * codecs.n_outer_checksums);
+    let stored = &stored[..n_packed as usize];
+    let max_bytes = max_bytes.saturating_add(CHECKSUM_BYTES * codecs.n_inner_checksums);
+    let unpacked = match codecs.compressor {
         Compressor::None => return Ok(()),
         Compressor::Gzip => n_unpacked(flate2::read::GzDecoder::new(stored), max_bytes),
         Compressor::Zlib => n_unpacked(flate2::read::ZlibDecoder::new(stored), max_bytes),

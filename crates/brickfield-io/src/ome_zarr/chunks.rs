@@ -1,29 +1,39 @@
 //! From chunks to voxels.
 
 use brickfield_core::{Scalar, ScalarType, Voxels};
-use zarrs::array::{Array, ElementOwned};
+use zarrs::array::{Array, ArrayBytes};
 use zarrs::storage::{ReadableStorage, ReadableStorageTraits};
 
-use super::image::VolumeAxes;
+use super::axes::VolumeAxes;
 use super::metadata::ArrayMetadata;
 use crate::error::bytes;
 use crate::limits::CheckedShape;
 use crate::samples::{FileScalar, with_room};
-use crate::{Note, ReadError};
+use crate::stored_type::StoredType;
+use crate::{ByteOrder, Note, ReadError};
 
-/// Reads all chunks that hold the first entry of every other axis; notes that some are not stored.
+/// The part of an array that is read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Part<'a> {
+    /// Path of the array, without a slash in front.
+    pub(super) path: &'a str,
+    pub(super) volume_axes: VolumeAxes,
+    /// The entry along each axis that is none of the volume's.
+    pub(super) entries: &'a [u64],
+}
+
+/// Reads all chunks that hold the part; notes that some are not stored.
 pub(super) fn read(
     store: &ReadableStorage,
-    path: &str,
+    part: Part,
     metadata: &ArrayMetadata,
-    volume_axes: VolumeAxes,
     shape: &CheckedShape,
 ) -> Result<(Voxels, Option<Note>), ReadError> {
-    let array = Array::new_with_metadata(store.clone(), path, metadata.for_zarrs()?);
+    let array = Array::new_with_metadata(store.clone(), &format!("/{}", part.path), metadata.for_zarrs()?);
     let array = array.map_err(|e| ReadError::decoder("the array", e))?;
     let dims = shape.dims.to_array().map(u64::from);
-    let mut reader = Reader { array, metadata, volume_axes, dims, n_chunks: 0, n_missing: 0 };
-    let voxels = match metadata.scalar {
+    let mut reader = Reader { array, metadata, part, dims, n_chunks: 0, n_missing: 0 };
+    let voxels = match shape.scalar {
         ScalarType::U8 => reader.read::<u8>(),
         ScalarType::I8 => reader.read::<i8>(),
         ScalarType::U16 => reader.read::<u16>(),
@@ -40,15 +50,18 @@ pub(super) fn read(
 struct Reader<'a> {
     array: Array<dyn ReadableStorageTraits>,
     metadata: &'a ArrayMetadata,
-    volume_axes: VolumeAxes,
+    part: Part<'a>,
     dims: [u64; 3],
     n_chunks: u64,
     /// Chunks that are not stored, and have the fill value.
     n_missing: u64,
 }
 
+/// The order of unpacked bytes.
+const NATIVE: ByteOrder = if cfg!(target_endian = "big") { ByteOrder::Big } else { ByteOrder::Little };
+
 impl Reader<'_> {
-    fn read<T: FileScalar + ElementOwned>(&mut self) -> Result<Voxels, ReadError> {
+    fn read<T: FileScalar>(&mut self) -> Result<Voxels, ReadError> {
         let fill = self.fill_value::<T>()?;
         let n = self.dims.iter().product::<u64>() as usize;
         let mut values = with_room::<T>(n)?;
@@ -69,26 +82,29 @@ impl Reader<'_> {
 
     fn fill_value<T: FileScalar>(&self) -> Result<T, ReadError> {
         let bytes = self.array.fill_value().as_ne_bytes();
-        let native = if cfg!(target_endian = "big") { crate::ByteOrder::Big } else { crate::ByteOrder::Little };
-        let mut values = Vec::new();
-        T::append(bytes, native, &mut values);
-        values.first().copied().ok_or_else(|| ReadError::field("fill_value", format!("{bytes:?}"), T::TYPE.name()))
+        let values = self.samples(bytes, "the fill value")?;
+        let stored: StoredType = self.metadata.stored;
+        values.first().copied().ok_or_else(|| ReadError::field("fill_value", format!("{bytes:?}"), stored.name()))
+    }
+
+    fn samples<T: FileScalar>(&self, bytes: &[u8], what: &str) -> Result<Vec<T>, ReadError> {
+        let stored = self.metadata.stored;
+        let mut samples = with_room(bytes.len() / stored.n_bytes())?;
+        let outcome = stored.append(bytes, NATIVE, &mut samples);
+        outcome.map_err(|fault| fault.of_sample(samples.len(), what))?;
+        Ok(samples)
     }
 
     /// Sizes along x, y, z; 1 where the array has no such axis.
     fn along_volume(&self, sizes: &[u64]) -> [u64; 3] {
-        self.volume_axes.map(|axis| axis.map_or(1, |a| sizes[a]))
+        self.part.volume_axes.map(|axis| axis.map_or(1, |a| sizes[a]))
     }
 
     /// Whether the chunk is stored.
-    fn read_chunk<T: FileScalar + ElementOwned>(
-        &self,
-        at: [u64; 3],
-        chunk: [u64; 3],
-        values: &mut [T],
-    ) -> Result<bool, ReadError> {
-        let mut indices = vec![0; self.metadata.shape.len()];
-        for (axis, i) in self.volume_axes.iter().zip(at) {
+    fn read_chunk<T: FileScalar>(&self, at: [u64; 3], chunk: [u64; 3], values: &mut [T]) -> Result<bool, ReadError> {
+        let chunk_shape = &self.metadata.chunk_shape;
+        let mut indices: Vec<u64> = self.part.entries.iter().zip(chunk_shape).map(|(entry, n)| entry / n).collect();
+        for (axis, i) in self.part.volume_axes.iter().zip(at) {
             if let Some(axis) = axis {
                 indices[*axis] = i;
             }
@@ -97,11 +113,13 @@ impl Reader<'_> {
         let stored = self.array.retrieve_encoded_chunk(&indices).map_err(|e| ReadError::decoder(&what, e))?;
         let Some(stored) = stored else { return Ok(false) };
         let named = format!("{what} of {} stored", bytes(stored.len()));
-        let (chunk_shape, sample_bytes) = (&self.metadata.chunk_shape, size_of::<T>() as u64);
+        let sample_bytes = self.metadata.stored.n_bytes() as u64;
         self.metadata.packing.check(&stored, chunk_shape, sample_bytes, &what)?;
         drop(stored);
-        let samples: Vec<T> = self.array.retrieve_chunk(&indices).map_err(|e| ReadError::decoder(named, e))?;
-        let n_expected = self.metadata.chunk_shape.iter().product::<u64>() as usize;
+        let unpacked: ArrayBytes = self.array.retrieve_chunk(&indices).map_err(|e| ReadError::decoder(&named, e))?;
+        let unpacked = unpacked.into_fixed().map_err(|e| ReadError::decoder(named, e))?;
+        let samples = self.samples(&unpacked, &what)?;
+        let n_expected = chunk_shape.iter().product::<u64>() as usize;
         if samples.len() != n_expected {
             return Err(ReadError::TooFewSamples { what, found: samples.len(), expected: n_expected });
         }
@@ -111,11 +129,15 @@ impl Reader<'_> {
 
     /// Copies the part of a chunk that lies in the volume; `start` is its first voxel.
     fn place<T: Copy>(&self, samples: &[T], start: [u64; 3], chunk: [u64; 3], values: &mut [T]) {
-        let strides = self.along_volume(&strides(&self.metadata.chunk_shape));
+        let chunk_shape = &self.metadata.chunk_shape;
+        let all_strides = strides(chunk_shape);
+        let strides = self.along_volume(&all_strides);
+        let first = self.part.entries.iter().zip(chunk_shape).zip(&all_strides).map(|((i, n), stride)| i % n * stride);
+        let first: u64 = first.sum();
         let [nx, ny, nz] = [0, 1, 2].map(|i| chunk[i].min(self.dims[i] - start[i]));
         for z in 0..nz {
             for y in 0..ny {
-                let from = (z * strides[2] + y * strides[1]) as usize;
+                let from = (first + z * strides[2] + y * strides[1]) as usize;
                 let row = ((start[2] + z) * self.dims[1] + start[1] + y) * self.dims[0] + start[0];
                 let out = &mut values[row as usize..(row + nx) as usize];
                 match strides[0] {

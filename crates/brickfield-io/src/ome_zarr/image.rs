@@ -1,51 +1,99 @@
-//! The multiscales metadata: which array is the finest level, its axes, and where it lies.
+//! An image of a store: its array, its axes, and where it lies.
 
 use brickfield_core::glam::DVec3;
 use serde_json::Value;
-use zarrs::storage::ReadableStorage;
 
-use super::json::read_json;
-use crate::choice::Entries;
+use super::axes::{Axis, VolumeAxes, choose_entries, volume_axes_by_name, volume_axes_of_array};
 use crate::error::counted;
+use crate::length_unit::common_unit;
 use crate::opened::FileFacts;
-use crate::placement::GridPlacement;
-use crate::{ChoiceKind, Note, ReadError};
+use crate::placement::{AXES, GridPlacement};
+use crate::{Note, ReadError, WorldFrame};
 
-/// The finest level of one image.
 pub(super) struct ZarrImage {
-    /// Path of the array in the store, with a slash in front.
+    /// Path of the array in the store, without a slash in front.
     pub(super) path: String,
+    /// Whether it is an image of OME-Zarr; a plain array has no place and no spacing.
+    is_placed: bool,
     axes: Vec<Axis>,
     /// World units per index, and the world position of index 0, for each axis.
     scale: Vec<f64>,
     translation: Vec<f64>,
+    channel_names: Vec<String>,
 }
 
-struct Axis {
-    name: String,
-    unit: Option<String>,
-}
+/// Axes before version 0.3, which names none.
+const OLD_AXES: [&str; 5] = ["t", "c", "z", "y", "x"];
 
-/// Which array axis is x, y, z; none where the array is flat.
-pub(super) type VolumeAxes = [Option<usize>; 3];
+const MAX_AXES: usize = 8;
 
 impl ZarrImage {
-    pub(super) fn read(store: &ReadableStorage, found: &mut FileFacts) -> Result<ZarrImage, ReadError> {
-        let (prefix, multiscales) = find_multiscales(store)?;
-        let names = multiscales.iter().map(|m| m["name"].as_str().unwrap_or_default().to_owned()).collect();
-        let multiscale = &multiscales[found.choose(ChoiceKind::Image, Entries::Named(names))? as usize];
-        let dataset = &multiscale["datasets"][0];
-        let path = dataset["path"].as_str().ok_or(ReadError::Missing { field: "multiscales/datasets/path" })?;
-        check_path(path)?;
-        let axes: Vec<Axis> = multiscale["axes"].as_array().into_iter().flatten().map(Axis::of).collect();
+    pub(super) fn of_multiscale(
+        path: String,
+        multiscale: &Value,
+        dataset: &Value,
+        ome: &Value,
+    ) -> Result<ZarrImage, ReadError> {
+        let axes = match multiscale["axes"].as_array() {
+            Some(axes) => axes.iter().map(Axis::of).collect(),
+            None => OLD_AXES.map(|name| Axis::of(&name.into())).into(),
+        };
+        let mut image = ZarrImage::new(path, axes)?;
+        image.transform(&dataset["coordinateTransformations"])?;
+        image.transform(&multiscale["coordinateTransformations"])?;
+        image.is_placed = true;
+        let channels = ome["omero"]["channels"].as_array().into_iter().flatten();
+        image.channel_names = channels.map(|c| c["label"].as_str().unwrap_or_default().to_owned()).collect();
+        Ok(image)
+    }
+
+    /// A plain array; `names` is a list of the names of its axes, or null.
+    pub(super) fn of_array(path: String, names: &Value, n_axes: usize) -> Result<ZarrImage, ReadError> {
+        let axes = (0..n_axes).map(|i| Axis::of(&names[i])).collect();
+        ZarrImage::new(path, axes)
+    }
+
+    fn new(path: String, axes: Vec<Axis>) -> Result<ZarrImage, ReadError> {
         if axes.is_empty() || axes.len() > MAX_AXES {
             return Err(ReadError::field("number of axes", axes.len(), format!("1 to {MAX_AXES}")));
         }
         let (scale, translation) = (vec![1.0; axes.len()], vec![0.0; axes.len()]);
-        let mut image = ZarrImage { path: format!("{prefix}/{path}"), axes, scale, translation };
-        image.transform(&dataset["coordinateTransformations"])?;
-        image.transform(&multiscale["coordinateTransformations"])?;
-        Ok(image)
+        Ok(ZarrImage { path, is_placed: false, axes, scale, translation, channel_names: Vec::new() })
+    }
+
+    /// Which axis is x, y, z, and the entry to read along each of the others.
+    pub(super) fn choose(&self, shape: &[u64], found: &mut FileFacts) -> Result<(VolumeAxes, Vec<u64>), ReadError> {
+        if shape.len() != self.axes.len() {
+            let expected = format!("{}, as the image has axes", self.axes.len());
+            return Err(ReadError::field("number of array dimensions", shape.len(), expected));
+        }
+        let volume_axes = match self.is_placed {
+            true => volume_axes_by_name(&self.axes)?,
+            false => volume_axes_of_array(&self.axes),
+        };
+        let entries = choose_entries(&self.axes, shape, volume_axes, &self.channel_names, found)?;
+        Ok((volume_axes, entries))
+    }
+
+    /// Where the volume lies; lengths in the unit of x, which `found` is told.
+    pub(super) fn placement(
+        &self,
+        volume_axes: VolumeAxes,
+        is_spacing_wanted: bool,
+        found: &mut FileFacts,
+    ) -> GridPlacement {
+        if !self.is_placed {
+            let assumed = AXES.into_iter().zip(volume_axes).filter(|(_, axis)| axis.is_some() && !is_spacing_wanted);
+            let reason = "is not stated";
+            found.frame = WorldFrame::Plain;
+            found.notes.extend(assumed.map(|(axis, _)| Note::SpacingAssumed { axis, reason }));
+            return GridPlacement::axis_aligned(DVec3::ONE, DVec3::splat(0.5));
+        }
+        let of = |values: &[f64], missing| DVec3::from(volume_axes.map(|axis| axis.map_or(missing, |a| values[a])));
+        let units = volume_axes.map(|axis| axis.and_then(|a| self.axes[a].unit.as_deref()));
+        let common = common_unit(units, &mut found.notes);
+        found.unit = common.name;
+        GridPlacement::axis_aligned(of(&self.scale, 1.0), of(&self.translation, 0.0)).scaled(common.factors)
     }
 
     /// Applies a list of transformations after the earlier ones.
@@ -85,67 +133,4 @@ impl ZarrImage {
             )
         })
     }
-
-    /// Finds x, y and z by name; notes the parts that are left out of longer other axes.
-    pub(super) fn volume_axes(&self, shape: &[u64], notes: &mut Vec<Note>) -> Result<VolumeAxes, ReadError> {
-        if shape.len() != self.axes.len() {
-            let expected = format!("{}, as the image has axes", self.axes.len());
-            return Err(ReadError::field("number of array dimensions", shape.len(), expected));
-        }
-        let find = |name: &str| self.axes.iter().position(|a| a.name.eq_ignore_ascii_case(name));
-        let volume_axes = ["x", "y", "z"].map(find);
-        if volume_axes[0].is_none() || volume_axes[1].is_none() {
-            return Err(ReadError::Missing { field: "an axis named x and one named y" });
-        }
-        for (axis, n_entries) in shape.iter().enumerate() {
-            if !volume_axes.contains(&Some(axis)) && *n_entries > 1 {
-                notes.push(Note::FirstOfAxis { axis: self.axes[axis].name.clone(), n_entries: *n_entries });
-            }
-        }
-        Ok(volume_axes)
-    }
-
-    pub(super) fn placement(&self, volume_axes: VolumeAxes) -> GridPlacement {
-        let scale = volume_axes.map(|axis| axis.map_or(1.0, |a| self.scale[a]));
-        let translation = volume_axes.map(|axis| axis.map_or(0.0, |a| self.translation[a]));
-        GridPlacement::axis_aligned(DVec3::from(scale), DVec3::from(translation))
-    }
-
-    pub(super) fn unit(&self, volume_axes: VolumeAxes) -> Option<String> {
-        volume_axes.into_iter().flatten().find_map(|axis| self.axes[axis].unit.clone())
-    }
-}
-
-const MAX_AXES: usize = 8;
-
-impl Axis {
-    /// An object with a name, or the bare name that versions before 0.4 had.
-    fn of(value: &Value) -> Axis {
-        let name = value.as_str().or(value["name"].as_str()).unwrap_or_default().to_owned();
-        Axis { name, unit: value["unit"].as_str().map(str::to_owned) }
-    }
-}
-
-/// The images of the folder, or of its part `0` where Bio-Formats wrote it; never an empty list.
-fn find_multiscales(store: &ReadableStorage) -> Result<(String, Vec<Value>), ReadError> {
-    for prefix in ["", "/0"] {
-        let key = |name: &str| format!("{prefix}/{name}").trim_start_matches('/').to_owned();
-        let v3 = read_json(store, &key("zarr.json"))?.map(|json| json["attributes"]["ome"].clone());
-        let ome = match v3 {
-            Some(ome) => Some(ome),
-            None => read_json(store, &key(".zattrs"))?,
-        };
-        let multiscales = ome.and_then(|ome| ome["multiscales"].as_array().cloned()).unwrap_or_default();
-        if !multiscales.is_empty() {
-            return Ok((prefix.to_owned(), multiscales));
-        }
-    }
-    Err(ReadError::Missing { field: "multiscales (in zarr.json or .zattrs)" })
-}
-
-/// A path must stay in the folder.
-fn check_path(path: &str) -> Result<(), ReadError> {
-    let stays =
-        !path.is_empty() && path.split('/').all(|part| !matches!(part, "" | "." | "..")) && !path.contains('\\');
-    if stays { Ok(()) } else { Err(ReadError::field("datasets/path", path, "a path within the folder")) }
 }

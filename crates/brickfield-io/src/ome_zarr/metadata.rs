@@ -6,31 +6,37 @@ use zarrs::storage::ReadableStorage;
 
 use super::bounds::Packing;
 use super::json::{numbers, read_json};
+use super::node::joined;
 use crate::error::counted;
 use crate::limits::check_bytes;
+use crate::stored_type::StoredType;
 use crate::{Limits, ReadError};
 
 pub(super) struct ArrayMetadata {
     /// Samples along each axis, slowest first.
     pub(super) shape: Vec<u64>,
     pub(super) chunk_shape: Vec<u64>,
-    pub(super) scalar: ScalarType,
+    pub(super) stored: StoredType,
     pub(super) packing: Packing,
+    /// Names of the axes (Zarr v3), or null.
+    pub(super) dimension_names: Value,
     /// The document, made fit for `zarrs`.
     document: Value,
 }
+
+const SUPPORTED: &str = "8 to 64 bit integers, 16 to 64 bit floats and bool are";
 
 /// More chunks than this are not looked for.
 const MAX_CHUNKS: u128 = 1 << 24;
 
 impl ArrayMetadata {
+    /// The metadata of the array at a path without a slash in front.
     pub(super) fn read(store: &ReadableStorage, path: &str) -> Result<ArrayMetadata, ReadError> {
-        let folder = path.trim_start_matches('/');
-        let metadata = match read_json(store, &format!("{folder}/zarr.json"))? {
+        let metadata = match read_json(store, &joined(path, "zarr.json"))? {
             Some(json) => ArrayMetadata::of_v3(&json)?,
             None => {
-                let json = read_json(store, &format!("{folder}/.zarray"))?;
-                ArrayMetadata::of_v2(&json.ok_or(ReadError::Missing { field: "zarr.json or .zarray of level 0" })?)?
+                let json = read_json(store, &joined(path, ".zarray"))?;
+                ArrayMetadata::of_v2(&json.ok_or(ReadError::Missing { field: "zarr.json or .zarray of the array" })?)?
             }
         };
         if metadata.shape.len() != metadata.chunk_shape.len() || metadata.chunk_shape.contains(&0) {
@@ -41,38 +47,56 @@ impl ArrayMetadata {
         Ok(metadata)
     }
 
+    /// The number of axes of the array at a path, whatever else it is.
+    pub(super) fn n_axes(store: &ReadableStorage, path: &str) -> Result<usize, ReadError> {
+        let json = match read_json(store, &joined(path, "zarr.json"))? {
+            Some(json) => Some(json),
+            None => read_json(store, &joined(path, ".zarray"))?,
+        };
+        Ok(json.and_then(|json| json["shape"].as_array().map(Vec::len)).unwrap_or(0))
+    }
+
     fn of_v2(json: &Value) -> Result<ArrayMetadata, ReadError> {
         let dtype = json["dtype"].as_str().unwrap_or_default();
-        let scalar = match dtype.trim_start_matches(['<', '>', '|', '=']) {
-            "u1" => ScalarType::U8,
-            "i1" => ScalarType::I8,
-            "u2" => ScalarType::U16,
-            "i2" => ScalarType::I16,
-            "u4" => ScalarType::U32,
-            "i4" => ScalarType::I32,
-            "f4" => ScalarType::F32,
-            "f8" => ScalarType::F64,
-            _ => return Err(ReadError::unsupported("dtype", &json["dtype"], crate::SCALARS)),
+        let stored = match dtype.trim_start_matches(['<', '>', '|', '=']) {
+            "u1" => ScalarType::U8.into(),
+            "i1" => ScalarType::I8.into(),
+            "u2" => ScalarType::U16.into(),
+            "i2" => ScalarType::I16.into(),
+            "u4" => ScalarType::U32.into(),
+            "i4" => ScalarType::I32.into(),
+            "f4" => ScalarType::F32.into(),
+            "f8" => ScalarType::F64.into(),
+            "b1" => StoredType::Bool,
+            "f2" => StoredType::F16,
+            "i8" => StoredType::I64,
+            "u8" => StoredType::U64,
+            _ => return Err(ReadError::unsupported("dtype", &json["dtype"], SUPPORTED)),
         };
         let shape = numbers(json, "shape")?;
-        let packing = Packing::of_v2(&json["compressor"])?;
+        let packing = Packing::of_v2(json)?;
         let mut document = json.clone();
         let level = document.get_mut("compressor").and_then(|c| c.get_mut("level"));
         level.into_iter().for_each(state_gzip_level);
-        Ok(ArrayMetadata { shape, chunk_shape: numbers(json, "chunks")?, scalar, packing, document })
+        let dimension_names = Value::Null;
+        Ok(ArrayMetadata { shape, chunk_shape: numbers(json, "chunks")?, stored, packing, dimension_names, document })
     }
 
     fn of_v3(json: &Value) -> Result<ArrayMetadata, ReadError> {
-        let scalar = match json["data_type"].as_str().unwrap_or_default() {
-            "uint8" => ScalarType::U8,
-            "int8" => ScalarType::I8,
-            "uint16" => ScalarType::U16,
-            "int16" => ScalarType::I16,
-            "uint32" => ScalarType::U32,
-            "int32" => ScalarType::I32,
-            "float32" => ScalarType::F32,
-            "float64" => ScalarType::F64,
-            _ => return Err(ReadError::unsupported("data_type", &json["data_type"], crate::SCALARS)),
+        let stored = match json["data_type"].as_str().unwrap_or_default() {
+            "uint8" => ScalarType::U8.into(),
+            "int8" => ScalarType::I8.into(),
+            "uint16" => ScalarType::U16.into(),
+            "int16" => ScalarType::I16.into(),
+            "uint32" => ScalarType::U32.into(),
+            "int32" => ScalarType::I32.into(),
+            "float32" => ScalarType::F32.into(),
+            "float64" => ScalarType::F64.into(),
+            "bool" => StoredType::Bool,
+            "float16" => StoredType::F16,
+            "int64" => StoredType::I64,
+            "uint64" => StoredType::U64,
+            _ => return Err(ReadError::unsupported("data_type", &json["data_type"], SUPPORTED)),
         };
         let grid = &json["chunk_grid"];
         if grid["name"] != "regular" {
@@ -80,7 +104,8 @@ impl ArrayMetadata {
         }
         let chunk_shape = numbers(&grid["configuration"], "chunk_shape")?;
         let packing = Packing::of_v3(&json["codecs"])?;
-        Ok(ArrayMetadata { shape: numbers(json, "shape")?, chunk_shape, scalar, packing, document: json.clone() })
+        let (shape, dimension_names) = (numbers(json, "shape")?, json["dimension_names"].clone());
+        Ok(ArrayMetadata { shape, chunk_shape, stored, packing, dimension_names, document: json.clone() })
     }
 
     /// The metadata as `zarrs` has them.
@@ -90,7 +115,7 @@ impl ArrayMetadata {
 
     pub(super) fn chunk_bytes(&self) -> u128 {
         let samples = self.chunk_shape.iter().fold(1u128, |n, s| n.saturating_mul(u128::from(*s)));
-        samples.saturating_mul(self.scalar.n_bytes() as u128)
+        samples.saturating_mul(self.stored.n_bytes() as u128)
     }
 
     /// Holds the size of a chunk and the number of chunks against sensible bounds.

@@ -1,13 +1,16 @@
-//! OME-Zarr 0.4 (Zarr v2) and 0.5 (Zarr v3): the first image of a folder at its finest level. Arrays by `zarrs`.
+//! OME-Zarr 0.1 to 0.5, and plain Zarr arrays, v2 and v3. Arrays by `zarrs`.
 //!
 //! The OME metadata are read here and not by `ome_zarr_metadata`, which keeps scales and translations in 32 bits.
-//! Not: labels, plates, transforms by path, nested shards, two compressors in a row.
+//! Not: whole plates, transforms by path, nested shards, filters, two compressors in a row.
 
+mod axes;
 mod bounds;
 mod chunks;
+mod find;
 mod image;
 mod json;
 mod metadata;
+mod node;
 mod write;
 
 pub use write::save;
@@ -18,19 +21,19 @@ use std::sync::Arc;
 
 use zarrs::filesystem::FilesystemStore;
 use zarrs::storage::store::MemoryStore;
-use zarrs::storage::{ReadableStorage, StoreKey, WritableStorageTraits};
+use zarrs::storage::{ListableStorageTraits, ReadableStorage, ReadableStorageTraits, StoreKey, WritableStorageTraits};
 
 use crate::guard::guarded;
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
 use crate::{Format, OpenOptions, Opened, ReadError};
-use image::ZarrImage;
-use metadata::ArrayMetadata;
+use chunks::Part;
 
 /// Reads an OME-Zarr folder.
 ///
-/// Axes are found by name (x, y, z); of any other axis the first entry is read. The world is the file's own: the scale
-/// is the spacing, the translation is the first sample's centre. Chunks that are not stored have the fill value.
+/// Axes are found by name (x, y, z), or are the last ones of a plain array (z, y, x). Channels and times are choices; of
+/// any other axis the first entry is read. The world is the file's own: the scale is the spacing, the translation is the
+/// first sample's centre. Chunks that are not stored have the fill value.
 ///
 /// # Errors
 /// As [`ReadError`] lists them: metadata that are wrong, unsupported or beyond the limits; chunks that cannot be decoded.
@@ -52,17 +55,29 @@ pub fn read_entries(entries: &BTreeMap<String, Vec<u8>>, options: &OpenOptions) 
     read_store(Arc::new(store), options)
 }
 
-fn read_store(store: ReadableStorage, options: &OpenOptions) -> Result<Opened, ReadError> {
+fn read_store<S>(store: Arc<S>, options: &OpenOptions) -> Result<Opened, ReadError>
+where
+    S: ReadableStorageTraits + ListableStorageTraits + 'static,
+{
+    let readable: ReadableStorage = store.clone();
+    guarded("Zarr", || read_from(&readable, &*store, options))
+}
+
+fn read_from(
+    store: &ReadableStorage,
+    list: &dyn ListableStorageTraits,
+    options: &OpenOptions,
+) -> Result<Opened, ReadError> {
     let mut found = FileFacts::pictures(Format::OmeZarr, options);
-    let image = ZarrImage::read(&store, &mut found)?;
-    let array = ArrayMetadata::read(&store, &image.path)?;
-    let volume_axes = image.volume_axes(&array.shape, &mut found.notes)?;
+    let (image, array) = find::find(store, list, &mut found)?;
+    let (volume_axes, entries) = image.choose(&array.shape, &mut found)?;
     let dims = volume_axes.map(|axis| axis.map_or(1, |axis| array.shape[axis]));
-    let shape = CheckedShape::claim(dims, array.scalar, &options.limits)?;
-    let grid = image.placement(volume_axes).grid(shape.dims)?;
+    let shape = CheckedShape::claim(dims, array.stored, &options.limits)?;
+    let grid = image.placement(volume_axes, options.spacing.is_some(), &mut found).grid(shape.dims)?;
     array.check_chunks(&options.limits)?;
-    let (voxels, note) = guarded("Zarr", || chunks::read(&store, &image.path, &array, volume_axes, &shape))?;
+    let part = Part { path: &image.path, volume_axes, entries: &entries };
+    let (voxels, note) = chunks::read(store, part, &array, &shape)?;
     found.notes.extend(note);
-    found.unit = image.unit(volume_axes);
+    let voxels = shape.converted(voxels, &mut found.notes)?;
     found.finish(grid, voxels)
 }

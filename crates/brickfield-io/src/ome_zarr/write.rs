@@ -7,7 +7,7 @@ use std::{fs, io};
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Grid, ScalarType, Volume, Voxels};
 use serde_json::{Value, json};
-use zarrs::array::{Array, ArraySubset};
+use zarrs::array::{Array, ArraySubset, CodecOptions};
 use zarrs::filesystem::FilesystemStore;
 use zarrs::storage::ReadableWritableListableStorage;
 
@@ -64,15 +64,17 @@ fn write(
     let array = Array::new_with_metadata(store, "/0", metadata)?;
     array.store_metadata()?;
     let all = ArraySubset::new_with_shape(array.shape().to_vec());
+    // Chunks of zeros as well: a chunk that is missing might be a loss.
+    let whole = CodecOptions::default().with_store_empty_chunks(true);
     match &*voxels {
-        Voxels::U8(v) => array.store_array_subset(&all, &v[..])?,
-        Voxels::I8(v) => array.store_array_subset(&all, &v[..])?,
-        Voxels::U16(v) => array.store_array_subset(&all, &v[..])?,
-        Voxels::I16(v) => array.store_array_subset(&all, &v[..])?,
-        Voxels::U32(v) => array.store_array_subset(&all, &v[..])?,
-        Voxels::I32(v) => array.store_array_subset(&all, &v[..])?,
-        Voxels::F32(v) => array.store_array_subset(&all, &v[..])?,
-        Voxels::F64(v) => array.store_array_subset(&all, &v[..])?,
+        Voxels::U8(v) => array.store_array_subset_opt(&all, &v[..], &whole)?,
+        Voxels::I8(v) => array.store_array_subset_opt(&all, &v[..], &whole)?,
+        Voxels::U16(v) => array.store_array_subset_opt(&all, &v[..], &whole)?,
+        Voxels::I16(v) => array.store_array_subset_opt(&all, &v[..], &whole)?,
+        Voxels::U32(v) => array.store_array_subset_opt(&all, &v[..], &whole)?,
+        Voxels::I32(v) => array.store_array_subset_opt(&all, &v[..], &whole)?,
+        Voxels::F32(v) => array.store_array_subset_opt(&all, &v[..], &whole)?,
+        Voxels::F64(v) => array.store_array_subset_opt(&all, &v[..], &whole)?,
     }
     Ok(())
 }

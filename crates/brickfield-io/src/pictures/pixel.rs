@@ -10,6 +10,8 @@ use crate::colour::{ColourPart, Colours};
 use crate::limits::{CheckedShape, Limits};
 use crate::opened::FileFacts;
 use crate::samples::{allocate, append_binary};
+#[cfg(feature = "png")]
+use crate::stored_voxel::keep_components;
 use crate::{ByteOrder, ChoiceKind, Note, ReadError};
 
 /// What the samples of a pixel are.
@@ -184,10 +186,10 @@ impl PixelPart {
         let dims = [self.kept().len() as u64, n_pixels as u64, 1];
         let mut read = |n| {
             let mut values = allocate(&CheckedShape::claim(dims, stored, limits)?)?;
-            append_binary(&mut values, &mut bytes, n, order, what).map(|()| values)
+            append_binary(&mut values, &mut bytes, n, stored, order, what).map(|()| values)
         };
         match self {
-            PixelPart::Sample(_) => append_binary(voxels, &mut bytes, n_pixels, order, what),
+            PixelPart::Sample(_) => append_binary(voxels, &mut bytes, n_pixels, stored, order, what),
             PixelPart::Luminance => {
                 extend(voxels, Colours::Rgb.reduce(read(3 * n_pixels)?, ColourPart::Luminance));
                 Ok(())
@@ -200,16 +202,8 @@ impl PixelPart {
 /// The samples of each pixel that are kept.
 #[cfg(feature = "png")]
 pub(super) fn keep_samples(mut bytes: Vec<u8>, n_samples: usize, sample_bytes: usize, kept: Range<usize>) -> Vec<u8> {
-    if kept == (0..n_samples) {
-        return bytes;
-    }
-    let (n_in, n_out) = (n_samples * sample_bytes, kept.len() * sample_bytes);
-    let n_pixels = bytes.len() / n_in;
-    for i in 0..n_pixels {
-        let start = i * n_in + kept.start * sample_bytes;
-        bytes.copy_within(start..start + n_out, i * n_out);
-    }
-    bytes.truncate(n_pixels * n_out);
+    let n_kept = keep_components(&mut bytes, n_samples, sample_bytes, kept);
+    bytes.truncate(n_kept);
     bytes
 }
 

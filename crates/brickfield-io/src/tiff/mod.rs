@@ -17,8 +17,8 @@ mod unpack;
 
 use std::io::{BufRead, Seek};
 
+use brickfield_core::Voxels;
 use brickfield_core::glam::DVec3;
-use brickfield_core::{Scalar, Voxels, with_voxels};
 
 use crate::choice::Entries;
 use crate::files::{ByteSource, DataFiles};
@@ -27,7 +27,7 @@ use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
 use crate::pictures::{KeptSamples, PictureShape, PixelPart};
 use crate::placement::GridPlacement;
-use crate::samples::allocate;
+use crate::samples::{allocate, append_zeros};
 use crate::{ChoiceKind, Format, Limits, Note, OpenOptions, Opened, ReadError};
 use files::{OneFile, Plane, SUB_IFDS, StackFiles};
 use page::Page;
@@ -159,11 +159,4 @@ fn made<'v>(voxels: &'v mut Option<Voxels>, shape: &CheckedShape) -> Result<&'v 
         Some(voxels) => Ok(voxels),
         None => Ok(voxels.insert(allocate(shape)?)),
     }
-}
-
-fn append_zeros(voxels: &mut Voxels, n: usize) {
-    fn append<T: Scalar>(values: &mut Vec<T>, n: usize) {
-        values.resize(values.len() + n, T::from_f64(0.0));
-    }
-    with_voxels!(voxels, v => append(v, n));
 }

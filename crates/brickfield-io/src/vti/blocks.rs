@@ -1,14 +1,10 @@
-//! The header of binary data, and zlib blocks.
+//! The header of binary data, and compressed blocks.
 
 use std::io::{self, Read};
 
-use flate2::read::ZlibDecoder;
-
+use super::compressor::Compressor;
 use super::document::WordSize;
-use crate::deflate::{Unpacked, check_ratio};
-use crate::error::Damage;
 use crate::error::check_length;
-use crate::limits::CheckedShape;
 use crate::samples::fill_named;
 use crate::{ByteOrder, ReadError};
 
@@ -47,22 +43,23 @@ impl WordSize {
 /// The header of data that are not compressed: their length.
 ///
 /// A length of 32 bits wraps round in files of 4 GiB and more, which VTK reads all the same.
-pub(super) fn check_plain(words: &mut WordReader, n_left: u64, shape: &CheckedShape) -> Result<(), ReadError> {
+pub(super) fn check_plain(words: &mut WordReader, n_left: u64, n_bytes: u64) -> Result<(), ReadError> {
     let stated = words.next()?;
     let expected = match words.size {
-        WordSize::Four => shape.n_bytes() & 0xffff_ffff,
-        WordSize::Eight => shape.n_bytes(),
+        WordSize::Four => n_bytes & 0xffff_ffff,
+        WordSize::Eight => n_bytes,
     };
     if stated != expected {
         let expected = format!("{expected}, from the extent and the type");
         return Err(ReadError::field(format!("length of {}", words.what), stated, expected));
     }
-    check_length(words.what, n_left, u128::from(shape.n_bytes()))
+    check_length(words.what, n_left, n_bytes.into())
 }
 
-/// zlib blocks, decoded one after the other.
-pub(super) struct ZlibBlocks<'a> {
+/// Compressed blocks, decoded one after the other.
+pub(super) struct Blocks<'a> {
     source: &'a mut dyn Read,
+    compressor: Compressor,
     /// Bytes of each block, compressed and not; the last one first.
     sizes: Vec<(u64, u64)>,
     block: Vec<u8>,
@@ -75,48 +72,42 @@ pub(super) struct ZlibBlocks<'a> {
 pub(super) fn read_blocks<'a>(
     mut words: WordReader<'a>,
     n_left: u64,
-    shape: &CheckedShape,
-) -> Result<ZlibBlocks<'a>, ReadError> {
+    compressor: Compressor,
+    expected_bytes: u64,
+) -> Result<Blocks<'a>, ReadError> {
     let what = words.what;
     let [n_blocks, block_bytes, partial_bytes] = [words.next()?, words.next()?, words.next()?];
     let n_whole = if partial_bytes > 0 { n_blocks.saturating_sub(1) } else { n_blocks };
     let n_bytes = u128::from(n_whole) * u128::from(block_bytes) + u128::from(partial_bytes);
-    if n_bytes != u128::from(shape.n_bytes()) {
-        let expected = format!("{}, from the extent and the type", shape.n_bytes());
+    if n_bytes != u128::from(expected_bytes) {
+        let expected = format!("{expected_bytes}, from the extent and the type");
         return Err(ReadError::field(format!("length of {what}"), n_bytes, expected));
     }
     if block_bytes == 0 && n_whole > 0 {
         return Err(ReadError::field(format!("block size of {what}"), block_bytes, "at least 1"));
     }
     check_length(what, n_left, u128::from(n_blocks) * words.size.n_bytes() as u128)?;
-    check_ratio(what, n_left, n_bytes)?;
+    compressor.check_ratio(what, n_left, n_bytes)?;
     let mut sizes = Vec::new();
     for i in 0..n_blocks {
         let n = if i < n_whole { block_bytes } else { partial_bytes };
         sizes.push((words.next()?, n));
     }
     sizes.reverse();
-    Ok(ZlibBlocks { source: words.reader, sizes, block: Vec::new(), n_given: 0, fault: None })
+    Ok(Blocks { source: words.reader, compressor, sizes, block: Vec::new(), n_given: 0, fault: None })
 }
 
-impl ZlibBlocks<'_> {
+impl Blocks<'_> {
     fn decode_next(&mut self, n_compressed: u64, expected_bytes: u64) -> io::Result<()> {
         self.block.clear();
         self.n_given = 0;
         let mut compressed = (&mut *self.source).take(n_compressed);
-        let mut unpacked = Unpacked(ZlibDecoder::new(&mut compressed));
-        (&mut unpacked).take(expected_bytes).read_to_end(&mut self.block)?;
-        let n_bytes = self.block.len() as u64;
-        if n_bytes != expected_bytes {
-            return Err(Damage::ShortBlock { n_bytes, expected_bytes }.into());
-        }
-        // At the end is the checksum: a block that disagrees with it is not given.
-        unpacked.read(&mut [0]).inspect_err(|_| self.block.clear())?;
+        self.compressor.unpack(&mut compressed, expected_bytes, &mut self.block)?;
         io::copy(&mut compressed, &mut io::sink()).map(|_| ())
     }
 }
 
-impl Read for ZlibBlocks<'_> {
+impl Read for Blocks<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         while self.n_given == self.block.len() {
             if let Some(fault) = self.fault.take() {

@@ -1,118 +1,134 @@
-//! VTK XML ImageData, .vti (vtk.org, "VTK XML Formats"). XML by `quick-xml`.
+//! VTK XML ImageData, .vti and .pvti (vtk.org, "VTK XML Formats"). XML by `quick-xml`.
 //!
-//! Data as text, inline base64, appended raw and appended base64; zlib blocks; headers of 32 and 64 bits; both byte
-//! orders. Not: lz4 and lzma, several pieces, more than one value per voxel.
+//! Data as text, inline base64, appended raw and appended base64; blocks of zlib, LZ4 (`lz4_flex`) and LZMA
+//! (`lzma-rust2`); headers of 32 and 64 bits; both byte orders; pieces in one file or in several.
 
+mod attributes;
 mod blocks;
+mod compressor;
 mod document;
+mod elements;
 mod inline;
+mod metered;
+mod pieces;
 
 use std::io::{BufRead, Read, Seek, SeekFrom};
 
-use brickfield_core::glam::{DMat3, DVec3};
-use brickfield_core::{ScalarType, Voxels};
+use brickfield_core::Voxels;
 
-use crate::choice::Entries;
 use crate::error::check_length;
-use crate::files::{ByteSource, n_bytes_left};
+use crate::files::{ByteSource, DataFiles, n_bytes_left, open_named, stays_within};
+use crate::guard::guarded;
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
-use crate::placement::GridPlacement;
 use crate::samples::{allocate, append_binary, append_text, least_text_bytes};
-use crate::{ChoiceKind, Format, OpenOptions, Opened, ReadError};
+use crate::vtk_arrays::{Bits, VtkArray, VtkSample, choose, dims};
+use crate::{Format, OpenOptions, Opened, ReadError};
 use blocks::{WordReader, check_plain, read_blocks};
-use document::{Array, ArrayStorage, Document, Support};
+use document::{Array, ArrayStorage, Document, Piece};
 use inline::{Base64Reader, UntilTag};
+use pieces::Assembly;
 
-/// Reads a .vti file.
+/// Reads a .vti or .pvti file; `files` finds the pieces of the latter.
 ///
 /// The active scalars of PointData are read, else its first array of one component, else CellData's in the same way.
-/// Cell values are samples at cell centres. The world is the file's own.
+/// Cell values are samples at cell centres. The world is the file's own. Pieces have to cover the whole extent.
 ///
 /// # Errors
 /// As [`ReadError`] lists them: a document that is wrong, unsupported or beyond the limits; data that are missing.
-pub fn read(mut input: impl BufRead + Seek, options: &OpenOptions) -> Result<Opened, ReadError> {
-    read_from(&mut input, options)
+pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
+    guarded("VTK", || read_from(&mut input, files, options))
 }
 
-fn read_from(source: &mut dyn ByteSource, options: &OpenOptions) -> Result<Opened, ReadError> {
+fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
     let document = Document::read(source)?;
     let mut found = FileFacts::plain(Format::Vti, options);
-    let array = choose(&document, &mut found)?;
-    let scalar = scalar(&array.type_name)?;
-    let shape = CheckedShape::claim(dims(&document.extent, array.support)?, scalar, &options.limits)?;
-    let grid = placement(&document, array.support).grid(shape.dims)?;
-    let voxels = read_array(source, &document, array, &shape)?;
+    let arrays = document.arrays();
+    let chosen = choose(&arrays, &mut found)?;
+    let about = chosen.map(|i| arrays[i]).ok_or_else(|| document.missing("a DataArray in PointData or CellData"))?;
+    let geometry = &document.geometry;
+    let voxel = about.voxel(&mut found)?;
+    let shape = CheckedShape::claim(dims(&geometry.extent, about.support)?, voxel, &options.limits)?;
+    let grid = geometry.placement(about.support, &mut found.notes).grid(shape.dims)?;
+    let voxels = match &document.pieces[..] {
+        [piece] if piece.extent == geometry.extent && !document.is_parallel => {
+            read_array(source, &document, piece.array(0, about)?, &shape)?
+        }
+        _ => read_pieces(source, &document, files, about, &shape)?,
+    };
+    let voxels = shape.converted(voxels, &mut found.notes)?;
     found.finish(grid, voxels)
 }
 
-/// The array that is wanted; without a wish the active scalars, else the first array of one component.
-fn choose<'a>(document: &'a Document, found: &mut FileFacts) -> Result<&'a Array, ReadError> {
-    let arrays = &document.arrays;
-    let candidates = |support| arrays.iter().enumerate().filter(move |(_, a): &(usize, &Array)| a.support == support);
-    let support = match candidates(Support::Points).next() {
-        Some(_) => Support::Points,
-        None => Support::Cells,
-    };
-    let active = match support {
-        Support::Points => &document.point_scalars,
-        Support::Cells => &document.cell_scalars,
-    };
-    let named = active.as_ref().and_then(|name| candidates(support).find(|(_, a)| a.name == *name));
-    let single = || candidates(support).find(|(_, a)| a.n_components == 1 && scalar(&a.type_name).is_ok());
-    let preferred = named.or_else(single).or_else(|| candidates(support).next());
-    let (preferred, _) = preferred.ok_or_else(|| document.missing("a DataArray in PointData or CellData"))?;
-    let names = arrays.iter().map(|a| a.name.clone()).collect();
-    let array = &arrays[found.choose_or(ChoiceKind::Array, Entries::Named(names), preferred as u64)? as usize];
-    if array.n_components != 1 {
-        let value = format!("{} of array {}", array.n_components, array.name);
-        return Err(ReadError::unsupported("NumberOfComponents", value, "1 is"));
+impl Piece {
+    /// The array that the image has in all pieces; `i` counts them from 0.
+    fn array(&self, i: usize, about: &VtkArray) -> Result<&Array, ReadError> {
+        let is_same = |a: &&Array| a.about.name == about.name && a.about.support == about.support;
+        let array = self.arrays.iter().find(is_same).ok_or_else(|| {
+            let names: Vec<_> = self.arrays.iter().map(|a| a.about.name.as_str()).collect();
+            ReadError::field(
+                format!("arrays of piece {}", i + 1),
+                names.join(", "),
+                format!("one named {:?}", about.name),
+            )
+        })?;
+        let kind = |a: &VtkArray| format!("{} of {}", a.n_components, a.type_name);
+        match kind(&array.about) == kind(about) {
+            true => Ok(array),
+            false => {
+                let field = format!("components of array {:?} in piece {}", about.name, i + 1);
+                Err(ReadError::field(field, kind(&array.about), kind(about)))
+            }
+        }
     }
-    Ok(array)
 }
 
-fn scalar(type_name: &str) -> Result<ScalarType, ReadError> {
-    Ok(match type_name {
-        "UInt8" => ScalarType::U8,
-        "Int8" => ScalarType::I8,
-        "UInt16" => ScalarType::U16,
-        "Int16" => ScalarType::I16,
-        "UInt32" => ScalarType::U32,
-        "Int32" => ScalarType::I32,
-        "Float32" => ScalarType::F32,
-        "Float64" => ScalarType::F64,
-        _ => return Err(ReadError::unsupported("DataArray type", type_name, crate::SCALARS)),
-    })
-}
-
-/// Points from the first to the last of the extent; cells between them (at least one along a flat axis, as VTK has it).
-fn dims(extent: &[i64; 6], support: Support) -> Result<[u64; 3], ReadError> {
-    let mut dims = [0; 3];
-    for (axis, dim) in dims.iter_mut().enumerate() {
-        let [first, last] = [extent[2 * axis], extent[2 * axis + 1]].map(i128::from);
-        let n_points = last - first + 1;
-        let n = match support {
-            Support::Points => n_points,
-            Support::Cells if n_points == 1 => 1,
-            Support::Cells => n_points - 1,
-        };
-        *dim =
-            u64::try_from(n).map_err(|_| ReadError::field("Extent", format!("{first} to {last}"), "first <= last"))?;
+/// Reads the pieces of this document, or of the files that it names.
+fn read_pieces(
+    source: &mut dyn ByteSource,
+    document: &Document,
+    files: &dyn DataFiles,
+    about: &VtkArray,
+    shape: &CheckedShape,
+) -> Result<Voxels, ReadError> {
+    let mut assembly = Assembly::new(shape, document.geometry.extent, about.support)?;
+    if !document.is_parallel {
+        put_pieces(source, document, about, &mut assembly)?;
+        return assembly.finish();
     }
-    Ok(dims)
+    for piece in &document.pieces {
+        let name = piece.source.as_deref().ok_or(ReadError::Missing { field: "the Source of a Piece" })?;
+        if !stays_within(name) {
+            return Err(ReadError::field("Source of a piece", name, "a path within the folder"));
+        }
+        let in_piece = |fault| ReadError::decoder(format!("data file {name:?}"), fault);
+        let mut file = open_named(files, name)?;
+        read_piece_file(&mut *file, about, &mut assembly).map_err(in_piece)?;
+    }
+    assembly.finish()
 }
 
-fn placement(document: &Document, support: Support) -> GridPlacement {
-    let to_sample = match support {
-        Support::Points => DVec3::ZERO,
-        Support::Cells => DVec3::splat(0.5),
-    };
-    let [x, _, y, _, z, _] = document.extent.map(|e| e as f64);
-    // Direction is written row by row; column i is the direction of axis i.
-    let direction = DMat3::from_cols_array(&document.direction).transpose();
-    let steps = direction * DMat3::from_diagonal(DVec3::from(document.spacing));
-    let first_sample = DVec3::from(document.origin) + steps * (DVec3::new(x, y, z) + to_sample);
-    GridPlacement { first_sample, steps }
+fn read_piece_file(file: &mut dyn ByteSource, about: &VtkArray, assembly: &mut Assembly) -> Result<(), ReadError> {
+    let document = Document::read(file)?;
+    match document.is_parallel {
+        true => Err(ReadError::unsupported("VTKFile type", "PImageData", "ImageData is, of a piece")),
+        false => put_pieces(file, &document, about, assembly),
+    }
+}
+
+fn put_pieces(
+    source: &mut dyn ByteSource,
+    document: &Document,
+    about: &VtkArray,
+    assembly: &mut Assembly,
+) -> Result<(), ReadError> {
+    for (i, piece) in document.pieces.iter().enumerate() {
+        let Some(place) = assembly.place_of(i, &piece.extent)? else { continue };
+        let shape = assembly.shape_of(place)?;
+        let voxels = read_array(source, document, piece.array(i, about)?, &shape)?;
+        assembly.put(&voxels, place);
+    }
+    Ok(())
 }
 
 fn read_array(
@@ -121,24 +137,26 @@ fn read_array(
     array: &Array,
     shape: &CheckedShape,
 ) -> Result<Voxels, ReadError> {
-    let what = format!("DataArray {:?}", array.name);
+    let what = format!("DataArray {:?}", array.about.name);
+    let sample = array.about.sample()?;
     let position = document.position(array)?;
     source.seek(SeekFrom::Start(position)).map_err(|e| ReadError::io(&what, e))?;
     let n_left = n_bytes_left(source)?;
     match document.storage(array)? {
         ArrayStorage::Text => {
-            check_length(&what, n_left, least_text_bytes(shape.n_voxels()))?;
+            let n_numbers = shape.n_voxels() as u128 * u128::from(shape.voxel.n_components);
+            check_length(&what, n_left, least_text_bytes(n_numbers))?;
             let mut voxels = allocate(shape)?;
-            append_text(&mut voxels, &mut UntilTag::new(source), shape.n_voxels(), &what)?;
+            append_text(&mut voxels, &mut UntilTag::new(source), shape.n_voxels(), shape.voxel, &what)?;
             Ok(voxels)
         }
         ArrayStorage::Raw => {
             let n_tail = n_closing_bytes(source, n_left).map_err(|e| ReadError::io(&what, e))?;
-            read_binary(source, n_left - n_tail, document, shape, &what)
+            read_binary(source, n_left - n_tail, document, sample, shape, &what)
         }
         ArrayStorage::Base64 => {
             let mut decoded = Base64Reader::new(UntilTag::new(source));
-            read_binary(&mut decoded, n_left / 4 * 3 + 3, document, shape, &what)
+            read_binary(&mut decoded, n_left / 4 * 3 + 3, document, sample, shape, &what)
         }
     }
 }
@@ -162,22 +180,28 @@ fn read_binary(
     reader: &mut dyn Read,
     n_left: u64,
     document: &Document,
+    sample: VtkSample,
     shape: &CheckedShape,
     what: &str,
 ) -> Result<Voxels, ReadError> {
+    let n_bytes = sample.n_bytes(shape.n_voxels() as u64 * shape.voxel.n_components);
     let mut words = WordReader { reader, size: document.word, order: document.order, what };
-    let mut voxels;
-    match document.is_compressed {
-        false => {
-            check_plain(&mut words, n_left, shape)?;
-            voxels = allocate(shape)?;
-            append_binary(&mut voxels, words.reader, shape.n_voxels(), document.order, what)?;
+    let mut blocks;
+    let bytes: &mut dyn Read = match document.compressor {
+        None => {
+            check_plain(&mut words, n_left, n_bytes)?;
+            words.reader
         }
-        true => {
-            let mut blocks = read_blocks(words, n_left, shape)?;
-            voxels = allocate(shape)?;
-            append_binary(&mut voxels, &mut blocks, shape.n_voxels(), document.order, what)?;
+        Some(compressor) => {
+            blocks = read_blocks(words, n_left, compressor, n_bytes)?;
+            &mut blocks
         }
+    };
+    let mut voxels = allocate(shape)?;
+    let (n, voxel, order) = (shape.n_voxels(), shape.voxel, document.order);
+    match sample {
+        VtkSample::Bit => append_binary(&mut voxels, &mut Bits::new(bytes), n, voxel, order, what)?,
+        VtkSample::Bytes(_) => append_binary(&mut voxels, bytes, n, voxel, order, what)?,
     }
     Ok(voxels)
 }

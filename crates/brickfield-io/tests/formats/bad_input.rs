@@ -22,14 +22,22 @@ pub(crate) fn cases() -> Vec<BadFile> {
             name: "v.nrrd",
             good: b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 4 3 2\nencoding: raw\n\n012345678901234567890123".to_vec(),
             absurd: (b"4 3 2", b"16384 16384 4096", "1099511627776 bytes; the limit is"),
-            unsupported: (b"uchar", b"int64", "type \"int64\" is not supported"),
+            unsupported: (b"uchar", b"block", "type \"block\" is not supported"),
         },
         BadFile {
             name: "v.mha",
             good: b"NDims = 3\nDimSize = 4 3 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n012345678901234567890123"
                 .to_vec(),
             absurd: (b"4 3 2", b"16384 16384 4096", "1099511627776 bytes; the limit is"),
-            unsupported: (b"MET_UCHAR", b"MET_LONG_LONG", "ElementType \"MET_LONG_LONG\" is not supported"),
+            unsupported: (b"MET_UCHAR", b"MET_STRING", "ElementType \"MET_STRING\" is not supported"),
+        },
+        BadFile {
+            name: "v.vtk",
+            good: b"# vtk DataFile Version 3.0\n\nBINARY\nDATASET STRUCTURED_POINTS\nDIMENSIONS 4 3 2\nPOINT_DATA 24\n\
+                    SCALARS a unsigned_char 1\nLOOKUP_TABLE t\n012345678901234567890123"
+                .to_vec(),
+            absurd: (b"4 3 2", b"16384 16384 4096", "1099511627776 bytes; the limit is"),
+            unsupported: (b"unsigned_char", b"string", "array type \"string\" is not supported"),
         },
     ];
     #[cfg(feature = "vti")]
@@ -40,7 +48,7 @@ pub(crate) fn cases() -> Vec<BadFile> {
                 </PointData></Piece></ImageData></VTKFile>"
             .to_vec(),
         absurd: (b"0 3 0 2 0 1", b"1 16384 1 16384 1 4096", "1099511627776 bytes; the limit is"),
-        unsupported: (b"UInt8", b"Int64", "DataArray type \"Int64\" is not supported"),
+        unsupported: (b"UInt8", b"String", "array type \"String\" is not supported"),
     });
     #[cfg(feature = "nifti")]
     cases.push(BadFile {

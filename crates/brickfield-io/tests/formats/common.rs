@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Scalar, ScalarType, Voxels, with_voxels};
-use brickfield_io::{ByteOrder, Limits, OpenOptions, Opened};
+use brickfield_io::{ByteOrder, ChoiceKind, Limits, OpenOptions, Opened};
 
 pub(crate) const DIMS: UVec3 = UVec3::new(4, 3, 2);
 pub(crate) const ORDERS: [ByteOrder; 2] = [ByteOrder::Little, ByteOrder::Big];
@@ -12,6 +12,13 @@ pub(crate) const ORDERS: [ByteOrder; 2] = [ByteOrder::Little, ByteOrder::Big];
 /// Enough for every fixture, and little enough that a mistake shows.
 pub(crate) fn options() -> OpenOptions {
     Limits { max_bytes: 1 << 20 }.into()
+}
+
+/// The same, with an entry wanted.
+pub(crate) fn selecting(kind: ChoiceKind, wanted: Option<&str>) -> OpenOptions {
+    let mut options = options();
+    wanted.into_iter().for_each(|entry| options.selection.select(kind, entry));
+    options
 }
 
 /// A different value in every voxel of [`DIMS`], negative ones where the type has them.

@@ -39,6 +39,7 @@ const TEXT: &[(&str, &str)] = &[
         "v.vti",
         "not VTK XML ImageData: the start of the file is \"hello world\\n\", expected XML with the root element VTKFile",
     ),
+    ("v.vtk", "not legacy VTK: the start of the file is \"hello world\", expected # vtk DataFile Version"),
     #[cfg(feature = "tiff")]
     ("v.tif", "not TIFF: the start of the file is \"hello world\\n\", expected II or MM, then 42 or 43"),
     #[cfg(feature = "dicom")]
@@ -297,4 +298,74 @@ fn dicom_elements() {
         ),
         ("v.dcm", file[..n - 12 - 5].to_vec(), &within(n - 12 - 5)),
     ]);
+}
+
+/// Every cut, and every byte replaced by others: what is read or refused must not panic.
+mod changed {
+    use std::io::Cursor;
+
+    use brickfield_io::{Opened, ReadError, vtk_legacy};
+
+    use crate::common::options;
+
+    const OTHERS: [u8; 4] = [0, b'9', b'<', 0xff];
+
+    fn check(file: &[u8], read: &dyn Fn(&[u8]) -> Result<Opened, ReadError>) {
+        let mut changed = file.to_vec();
+        for i in 0..file.len() {
+            check_one(read(&file[..i]));
+            for other in OTHERS {
+                changed[i] = other;
+                check_one(read(&changed));
+            }
+            changed[i] = file[i];
+        }
+    }
+
+    fn check_one(outcome: Result<Opened, ReadError>) {
+        if let Err(fault) = outcome {
+            let said = fault.to_string();
+            assert!(!said.contains(['\n', '\r']) && !said.contains("panicked"), "{said}");
+        }
+    }
+
+    #[test]
+    fn legacy_vtk() {
+        for file in crate::vtk_legacy::examples() {
+            check(&file, &|bytes| vtk_legacy::read(Cursor::new(bytes), &options()));
+        }
+    }
+
+    #[cfg(any(feature = "vti", feature = "ome-zarr"))]
+    type Entries = std::collections::BTreeMap<String, Vec<u8>>;
+
+    #[cfg(any(feature = "vti", feature = "ome-zarr"))]
+    fn check_entries(entries: &Entries, read: &dyn Fn(&Entries) -> Result<Opened, ReadError>) {
+        for (name, bytes) in entries {
+            check(bytes, &|changed| {
+                let mut entries = entries.clone();
+                entries.insert(name.clone(), changed.to_vec());
+                read(&entries)
+            });
+        }
+    }
+
+    #[cfg(feature = "vti")]
+    #[test]
+    fn vti_pieces() {
+        check_entries(&crate::vti_pieces::parallel(), &|entries| {
+            brickfield_io::vti::read(Cursor::new(&entries["v.pvti"]), entries, &options())
+        });
+        for (_, file) in crate::vti::examples() {
+            check(&file, &|bytes| brickfield_io::vti::read(Cursor::new(bytes), &brickfield_io::NoFiles, &options()));
+        }
+    }
+
+    #[cfg(feature = "ome-zarr")]
+    #[test]
+    fn zarr() {
+        for entries in crate::zarr_arrays::examples() {
+            check_entries(&entries, &|entries| brickfield_io::ome_zarr::read_entries(entries, &options()));
+        }
+    }
 }

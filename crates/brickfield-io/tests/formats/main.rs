@@ -17,6 +17,7 @@ mod metaimage;
 #[cfg(feature = "nifti")]
 mod nifti;
 mod nrrd;
+mod nrrd_axes;
 #[cfg(feature = "ome-zarr")]
 mod ome_zarr;
 #[cfg(any(feature = "tiff", feature = "png"))]
@@ -24,6 +25,7 @@ mod pictures;
 mod raw;
 mod save;
 mod seeds;
+mod stored;
 #[cfg(feature = "tiff")]
 mod tiff;
 #[cfg(feature = "tiff")]
@@ -38,3 +40,8 @@ mod tiff_layout;
 mod tiff_ome;
 #[cfg(feature = "vti")]
 mod vti;
+#[cfg(feature = "vti")]
+mod vti_pieces;
+mod vtk_legacy;
+#[cfg(feature = "ome-zarr")]
+mod zarr_arrays;

@@ -1,8 +1,8 @@
 use std::io::Cursor;
 
-use brickfield_core::ScalarType;
 use brickfield_core::glam::DVec3;
-use brickfield_io::{ByteOrder, DataFiles, NoFiles, Note, Opened, ReadError, WorldFrame, metaimage};
+use brickfield_core::{ScalarType, Voxels};
+use brickfield_io::{ByteOrder, ChoiceKind, DataFiles, NoFiles, Note, Opened, ReadError, WorldFrame, metaimage};
 
 use crate::common::*;
 
@@ -81,18 +81,69 @@ fn two_and_four_dimensions() {
     let flat = "NDims = 2\nDimSize = 4 3\nElementSpacing = 2 3\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
     let flat = read(flat, &[0; 12], &NoFiles).unwrap();
     assert_eq!(flat.volume.grid().spacing(), DVec3::new(2.0, 3.0, 1.0));
-    let series =
-        "NDims = 4\nDimSize = 4 3 2 5\nElementSpacing = 1 1 1 9\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
-    let series = read(series, &[0; 120], &NoFiles).unwrap();
-    assert!(matches!(&series.notes[..], [Note::FirstOfAxis { n_entries: 5, .. }]));
+    let series = |wanted: Option<&str>| {
+        let header = "NDims = 4\nDimSize = 4 3 2 5\nElementSpacing = 1 1 1 9\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
+        let data: Vec<u8> = (0..120).collect();
+        let file = [header.as_bytes(), &data].concat();
+        metaimage::read(Cursor::new(file), &NoFiles, &selecting(ChoiceKind::Time, wanted)).unwrap()
+    };
+    let first = series(None);
+    assert_eq!(first.notes, [Note::OneOfSeveral { kind: ChoiceKind::Time, read: "0".to_owned(), n_entries: 5 }]);
+    assert_eq!(first.volume.voxels(), &Voxels::U8((0..24).collect()));
+    let fourth = series(Some("3"));
+    assert_eq!((fourth.volume.voxels(), fourth.notes.len()), (&Voxels::U8((72..96).collect()), 0));
+}
+
+#[test]
+fn colours_and_vectors() {
+    let read = |element: &str, n: usize, wanted: Option<&str>| {
+        let header = format!(
+            "NDims = 1\nDimSize = 2\nElementNumberOfChannels = {n}\nElementType = {element}\nElementDataFile = LOCAL\n"
+        );
+        let data = if element == "MET_UCHAR" { (1..).take(2 * n).collect() } else { floats(2 * n) };
+        let file = [header.into_bytes(), data].concat();
+        metaimage::read(Cursor::new(file), &NoFiles, &selecting(ChoiceKind::Channel, wanted)).unwrap()
+    };
+    let colours = read("MET_UCHAR", 3, None);
+    assert_eq!((colours.volume.voxels(), &colours.notes[..]), (&Voxels::U8(vec![2, 5]), &[Note::Luminance][..]));
+    assert_eq!(read("MET_UCHAR", 4, Some("alpha")).volume.voxels(), &Voxels::U8(vec![4, 8]));
+    let vectors = read("MET_FLOAT", 3, None);
+    assert_eq!(vectors.notes, [Note::OneOfSeveral { kind: ChoiceKind::Channel, read: "0".to_owned(), n_entries: 3 }]);
+    assert_eq!(vectors.volume.voxels(), &Voxels::F32(vec![0.5, 3.5]));
+    assert_eq!(read("MET_FLOAT", 2, Some("1")).volume.voxels(), &Voxels::F32(vec![1.5, 3.5]));
+}
+
+fn floats(n: usize) -> Vec<u8> {
+    (0..n).flat_map(|i| (i as f32 + 0.5).to_le_bytes()).collect()
+}
+
+#[test]
+fn lines_with_colons_and_any_first_key() {
+    let colons = "ObjectType: Image\nNDims: 3\nDimSize: 4 3 2\nElementType: MET_UCHAR\nElementDataFile: LOCAL\n";
+    let other = "Modality = MET_MOD_CT\nNDims = 3\nDimSize = 4 3 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
+    let folder = tempfile::tempdir().unwrap();
+    for header in [colons, other] {
+        let file = [header.as_bytes(), &bytes(&ramp(ScalarType::U8), ByteOrder::Little)].concat();
+        assert_ramp(&metaimage::read(Cursor::new(&file), &NoFiles, &options()).unwrap(), ScalarType::U8);
+        // Told by its content: the name says nothing.
+        std::fs::write(folder.path().join("scan"), &file).unwrap();
+        assert_ramp(&brickfield_io::open(&folder.path().join("scan"), &options()).unwrap(), ScalarType::U8);
+    }
 }
 
 #[test]
 fn headers_that_lie() {
     let refusal = |element, more| read(&header(element, more, "LOCAL"), &[0; 23], &NoFiles).unwrap_err().to_string();
     assert_eq!(refusal("MET_UCHAR", ""), "the data after the header holds 23 bytes; 24 are promised");
-    assert!(refusal("MET_LONG_LONG", "").contains("ElementType \"MET_LONG_LONG\" is not supported"));
-    assert!(refusal("MET_UCHAR", "ElementNumberOfChannels = 3").contains("ElementNumberOfChannels"));
+    assert!(refusal("MET_STRING", "").contains("ElementType \"MET_STRING\" is not supported"));
+    assert_eq!(
+        refusal("MET_UCHAR", "ElementNumberOfChannels = 0"),
+        "ElementNumberOfChannels is \"0\"; expected 1 to 32768"
+    );
+    assert_eq!(
+        refusal("MET_UCHAR", "ElementNumberOfChannels = 3"),
+        "the data after the header holds 23 bytes; 72 are promised"
+    );
     assert!(refusal("MET_UCHAR", "TransformMatrix = 1 2 3").contains("9 numbers"));
     assert!(refusal("MET_UCHAR", "HeaderSize = 99").contains("byte skip"));
 }

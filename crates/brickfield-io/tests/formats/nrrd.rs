@@ -123,23 +123,6 @@ fn without_directions_spacings_and_bounds_count() {
 }
 
 #[test]
-fn axes_beyond_space() {
-    let four = |sizes: &str, more: &str, n: usize| {
-        let header = format!("NRRD0004\ntype: uchar\ndimension: 4\nsizes: {sizes}\nencoding: raw\n{more}\n");
-        let data: Vec<u8> = (0..n).map(|i| i as u8).collect();
-        nrrd::read(Cursor::new([header.into_bytes(), data].concat()), &NoFiles, &options())
-    };
-    let series = four("4 3 2 5", "", 120).unwrap();
-    assert_eq!(series.volume.grid().dims(), DIMS);
-    assert!(matches!(&series.notes[..], [Note::FirstOfAxis { n_entries: 5, .. }]));
-    assert_eq!(series.volume.range().max, 23.0);
-    let flat = four("1 4 3 2", "kinds: vector domain domain domain\n", 24).unwrap();
-    assert_eq!((flat.volume.grid().dims(), flat.notes.len()), (DIMS, 0));
-    let colours = four("3 4 3 2", "space directions: none (1,0,0) (0,1,0) (0,0,1)\n", 72).unwrap_err();
-    assert!(colours.to_string().contains("number of components"), "{colours}");
-}
-
-#[test]
 fn not_finite_values_are_noted() {
     let data = format!("nan inf {}", "0 ".repeat(22));
     let opened = read(&header("float", "encoding: text"), data.as_bytes(), &NoFiles).unwrap();

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use brickfield_core::glam::DVec3;
 use brickfield_core::{ScalarType, Voxels};
-use brickfield_io::{ByteOrder, Note, Opened, ReadError, ome_zarr, open};
+use brickfield_io::{ByteOrder, ChoiceKind, Note, Opened, ReadError, ome_zarr, open};
 
 use crate::common::*;
 
@@ -139,8 +139,8 @@ fn axes_in_any_order_and_beyond_space() {
     let opened = read(&entries).unwrap();
     assert_ramp(&opened, ScalarType::U8);
     assert_eq!(opened.volume.grid().spacing(), DVec3::new(2.0, 3.0, 4.0));
-    let first = |axis: &str, n_entries| Note::FirstOfAxis { axis: axis.to_owned(), n_entries };
-    assert_eq!(opened.notes, [first("t", 2), first("c", 3)]);
+    let first = |kind, n_entries| Note::OneOfSeveral { kind, read: "0".to_owned(), n_entries };
+    assert_eq!(opened.notes, [first(ChoiceKind::Time, 2), first(ChoiceKind::Channel, 3)]);
 }
 
 /// A shard of two parts of one slice each, the second packed as well, and its index at the end.
@@ -210,7 +210,7 @@ fn bombs_and_lies() {
     assert!(refusal("[2,3,4]", "[0,1,1]").contains("chunk shape"));
     assert!(refusal("[2,3]", "[2,3]").contains("number of array dimensions"));
     assert!(refusal("[2,3,-4]", "[2,3,4]").contains("shape"));
-    assert!(read(&v2("<u8", "null", vec![])).unwrap_err().to_string().contains("dtype"));
+    assert!(read(&v2("<c8", "null", vec![])).unwrap_err().to_string().contains("dtype"));
     assert!(read(&v2("|u1", "null", vec![0; 23])).is_err());
     let mut outside = v2("|u1", "null", vec![0; 24]);
     let attributes = String::from_utf8(outside[".zattrs"].clone()).unwrap().replace("\"s0\"", "\"../s0\"");

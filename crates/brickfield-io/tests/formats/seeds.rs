@@ -14,12 +14,22 @@ fn seeds_for_fuzzing() {
             Some(Format::MetaImage) => "metaimage",
             Some(Format::Nifti) => "nifti",
             Some(Format::Vti) => "vti",
+            Some(Format::VtkLegacy) => "vtk_legacy",
             _ => "dicom",
         };
         write(folder, target, case.name, &case.good);
     }
+    for (i, file) in crate::vtk_legacy::examples().iter().enumerate() {
+        write(folder, "vtk_legacy", &format!("{i}.vtk"), file);
+    }
+    #[cfg(feature = "vti")]
+    for (compressor, file) in crate::vti::examples() {
+        write(folder, "vti", &format!("{compressor}.vti"), &file);
+    }
+    #[cfg(feature = "vti")]
+    write(folder, "pvti", "0", &packed(&crate::vti_pieces::parallel()));
     #[cfg(feature = "ome-zarr")]
-    for (i, entries) in crate::ome_zarr::examples().iter().enumerate() {
+    for (i, entries) in crate::ome_zarr::examples().iter().chain(&crate::zarr_arrays::examples()).enumerate() {
         write(folder, "ome_zarr", &i.to_string(), &packed(entries));
     }
     #[cfg(feature = "tiff")]
@@ -37,7 +47,7 @@ fn seeds_for_fuzzing() {
 }
 
 /// Entries as targets that read several files take them.
-#[cfg(any(feature = "ome-zarr", feature = "tiff", feature = "png"))]
+#[cfg(any(feature = "ome-zarr", feature = "tiff", feature = "png", feature = "vti"))]
 fn packed(entries: &std::collections::BTreeMap<String, Vec<u8>>) -> Vec<u8> {
     let entry = |(name, bytes): (&String, &Vec<u8>)| {
         [name.as_bytes(), b"\n", &(bytes.len() as u32).to_le_bytes(), bytes].concat()
