@@ -143,7 +143,7 @@ impl ReadError {
     }
 
     /// The file does not begin as the format does.
-    #[cfg(any(feature = "vti", feature = "nifti", feature = "dicom", feature = "tiff"))]
+    #[cfg(any(feature = "vti", feature = "nifti", feature = "mgh", feature = "dicom", feature = "tiff"))]
     pub(crate) fn wrong_start(format: Format, head: &[u8], expected: &'static str) -> ReadError {
         let what = "the start of the file";
         ReadError::WrongMagic { format, what, found: Shown::of_bytes(head), expected }

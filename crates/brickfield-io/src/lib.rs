@@ -20,6 +20,8 @@ mod length_unit;
 mod limits;
 mod lines;
 pub mod metaimage;
+#[cfg(feature = "mgh")]
+pub mod mgh;
 #[cfg(feature = "nifti")]
 pub mod nifti;
 mod note;
@@ -45,6 +47,8 @@ mod stored_voxel;
 pub mod tiff;
 #[cfg(feature = "vti")]
 pub mod vti;
+#[cfg(any(feature = "nifti", feature = "mgh"))]
+mod wrapped;
 
 pub use choice::{Choice, ChoiceKind, Selection};
 pub use error::{Damage, OpenError, ReadError, Shown};

@@ -70,7 +70,7 @@ impl CheckedShape {
     }
 
     /// Bytes of all components in the file.
-    #[cfg(any(feature = "vti", feature = "nifti"))]
+    #[cfg(feature = "vti")]
     pub(crate) fn n_stored_bytes(&self) -> u64 {
         self.n_voxels_claimed() as u64 * self.voxel.n_bytes() as u64
     }
