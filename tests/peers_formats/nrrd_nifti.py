@@ -140,7 +140,7 @@ def by_pynrrd(folder):
     )
     for kind, shape, axes, directions, part, entries in lists:
         for encoding in ("raw", "gzip"):
-            name = f"pynrrd-{kind}-{encoding}.seg.nrrd" if kind == "layers" else f"pynrrd-{kind}-{encoding}.nrrd"
+            name = f"pynrrd-{kind}-{encoding}.nrrd"
             path = os.path.join(folder, name)
             array = ramp("u1", shape)
             nrrd.write(path, array.T, {**space, "space directions": np.array(directions), "kinds": axes, "encoding": encoding})
@@ -174,7 +174,7 @@ def by_nibabel(folder):
                 image = image_type(data, nibabel_affine(), header=header, **({} if kind.startswith("mg") else {"dtype": data.dtype}))
                 nibabel.save(image, path)
                 voxels = ramp(dtype)
-                if kind.startswith("nifti") and order == "<" and dtype not in ("u8", "i8"):
+                if kind == "nifti-1" and order == "<" and dtype not in ("u8", "i8"):
                     voxels = sitk.GetArrayFromImage(sitk.ReadImage(path))
                 yield name, path, of_affine(nibabel.load(path), voxels)
 

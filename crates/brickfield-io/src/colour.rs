@@ -1,6 +1,8 @@
 //! Volumes in colour: one channel of them, or their luminance.
 
-use brickfield_core::{Scalar, Voxels, with_voxels};
+use brickfield_core::Scalar;
+#[cfg(any(feature = "dicom", feature = "tiff", feature = "png", test))]
+use brickfield_core::{Voxels, with_voxels};
 
 use crate::choice::Entries;
 use crate::opened::FileFacts;
@@ -58,11 +60,13 @@ impl Colours {
     }
 
     /// One value for each voxel, in place: integers of the luminance are rounded.
+    #[cfg(any(feature = "dicom", feature = "tiff", feature = "png", test))]
     pub(crate) fn reduce(self, interleaved: Voxels, part: ColourPart) -> Voxels {
         with_voxels!(interleaved, v => reduced(v, self.n_channels(), part))
     }
 }
 
+#[cfg(any(feature = "dicom", feature = "tiff", feature = "png", test))]
 fn reduced<T: Scalar>(mut values: Vec<T>, n_channels: usize, part: ColourPart) -> Voxels {
     let n_voxels = values.len() / n_channels;
     for i in 0..n_voxels {

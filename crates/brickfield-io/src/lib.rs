@@ -64,6 +64,7 @@ pub use samples::ByteOrder;
 pub use save::{Compression, SAVED_EXTENSIONS, SaveError, SaveOptions, save};
 
 /// The scalar types that can be read, for messages.
+#[cfg(any(feature = "vti", feature = "ome-zarr", feature = "tiff"))]
 pub(crate) const SCALARS: &str = "8, 16 and 32 bit integers, 32 and 64 bit floats are";
 
 /// The stored types that can be read, for messages.

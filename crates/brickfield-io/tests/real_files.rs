@@ -38,7 +38,7 @@ const FILES: &[(&str, &str, &str, f64)] = &[
     ("frogtissue", "ct/frogtissue.mhd", "u8", 1.0),
     ("fuel", "formats/fuel.nii.gz", "u8", 1.0),
     ("ct_perfusion_rgb", "formats/ct_perfusion_rgb.nii.gz", "u8", 1.0),
-    ("spm152", "mri/spm152.nii.gz", "u8", 90.739_097_595_214_84 / 250.0),
+    ("spm152", "mri/spm152.nii.gz", "u8", 90.739_101_171_493_53 / 250.0),
     ("fetal_template_T2", "mri/fetal_template_T2.nrrd", "f32", 1.0),
     ("hydrogen", "formats/hydrogen.vti", "f32", 1.0),
     ("GE_head_dicom", "ct/GE_head_dicom", "i16", 1.0),

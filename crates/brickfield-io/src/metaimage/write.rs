@@ -7,8 +7,10 @@ use std::path::Path;
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Grid, ScalarType, Volume};
 
+#[cfg(feature = "gzip")]
+use crate::Compression;
 use crate::save::{save_atomically, values, write_samples};
-use crate::{ByteOrder, Compression, SaveError, SaveOptions, WorldFrame};
+use crate::{ByteOrder, SaveError, SaveOptions, WorldFrame};
 
 /// Saves a volume as attached MetaImage (`.mha`): whole or not at all, for the file is renamed into place.
 ///
@@ -24,7 +26,7 @@ pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<(), S
 /// The errors of `out`.
 pub fn write(mut out: impl Write, volume: &Volume, options: &SaveOptions) -> io::Result<()> {
     let voxels = values(volume);
-    let packed = match options.compression {
+    let packed: Option<Vec<u8>> = match options.compression {
         #[cfg(feature = "gzip")]
         Compression::Lossless => {
             let mut zlib = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());

@@ -6,8 +6,10 @@ use std::path::Path;
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Grid, ScalarType, Volume};
 
+#[cfg(feature = "gzip")]
+use crate::Compression;
 use crate::save::{save_atomically, values, write_samples};
-use crate::{ByteOrder, Compression, SaveError, SaveOptions, WorldFrame};
+use crate::{ByteOrder, SaveError, SaveOptions, WorldFrame};
 
 /// Saves a volume as attached NRRD (`.nrrd`): whole or not at all, for the file is renamed into place.
 ///
