@@ -61,6 +61,7 @@ impl Colours {
 
     #[cfg(any(feature = "dicom", feature = "tiff", feature = "png", test))]
     /// One value for each voxel, in place: integers of the luminance are rounded.
+    #[cfg(any(feature = "dicom", feature = "tiff", feature = "png", test))]
     pub(crate) fn reduce(self, interleaved: Voxels, part: ColourPart) -> Voxels {
         with_voxels!(interleaved, v => reduced(v, self.n_channels(), part))
     }

@@ -148,14 +148,7 @@ impl ReadError {
         ReadError::WrongMagic { format, what, found: Shown::of_bytes(head), expected }
     }
 
-    #[cfg(any(
-        feature = "vti",
-        feature = "nifti",
-        feature = "dicom",
-        feature = "ome-zarr",
-        feature = "tiff",
-        feature = "png"
-    ))]
+    #[cfg(any(feature = "vti", feature = "dicom", feature = "ome-zarr", feature = "tiff", feature = "png"))]
     pub(crate) fn decoder(what: impl fmt::Display, source: impl Into<Box<dyn Error + Send + Sync>>) -> ReadError {
         ReadError::Decoder { what: one_line(&what.to_string()), source: source.into() }
     }

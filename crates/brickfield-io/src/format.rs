@@ -13,6 +13,7 @@ pub enum Format {
     Nrrd,
     MetaImage,
     Nifti,
+    Mgh,
     Vti,
     VtkLegacy,
     Dicom,
@@ -24,10 +25,11 @@ pub enum Format {
 
 impl Format {
     /// All formats.
-    pub const ALL: [Format; 10] = [
+    pub const ALL: [Format; 11] = [
         Format::Nrrd,
         Format::MetaImage,
         Format::Nifti,
+        Format::Mgh,
         Format::Vti,
         Format::VtkLegacy,
         Format::Dicom,
@@ -43,6 +45,7 @@ impl Format {
             Format::Nrrd => "NRRD",
             Format::MetaImage => "MetaImage",
             Format::Nifti => "NIfTI",
+            Format::Mgh => "MGH",
             Format::Vti => "VTK XML ImageData",
             Format::VtkLegacy => "legacy VTK",
             Format::Dicom => "DICOM",
@@ -58,7 +61,8 @@ impl Format {
         match self {
             Format::Nrrd => &["nrrd", "nhdr"],
             Format::MetaImage => &["mha", "mhd"],
-            Format::Nifti => &["nii", "nii.gz", "hdr", "hdr.gz"],
+            Format::Nifti => &["nii", "nii.gz", "hdr", "hdr.gz", "img", "img.gz"],
+            Format::Mgh => &["mgh", "mgz", "mgh.gz"],
             Format::Vti => &["vti", "pvti"],
             Format::VtkLegacy => &["vtk"],
             Format::Dicom => &["dcm", "dicom", "ima"],
@@ -74,6 +78,7 @@ impl Format {
         match self {
             Format::Nrrd | Format::MetaImage | Format::VtkLegacy => true,
             Format::Nifti => cfg!(feature = "nifti"),
+            Format::Mgh => cfg!(feature = "mgh"),
             Format::Vti => cfg!(feature = "vti"),
             Format::Dicom => cfg!(feature = "dicom"),
             Format::OmeZarr => cfg!(feature = "ome-zarr"),
@@ -81,6 +86,11 @@ impl Format {
             Format::Pictures => cfg!(any(feature = "tiff", feature = "png")),
             Format::Raw => false,
         }
+    }
+
+    /// Whether files are gzipped as a whole, header and all.
+    pub(crate) const fn may_be_gzipped(self) -> bool {
+        matches!(self, Format::Nifti | Format::Mgh)
     }
 
     /// The format that the end of the file's name suggests.
@@ -92,7 +102,7 @@ impl Format {
 
     /// The format whose magic these first bytes of a file have. 352 bytes suffice, 4 KiB are better.
     ///
-    /// A gzip wrapper has to be taken off before: of NIfTI it is usual, of the others it is none.
+    /// A gzip wrapper has to be taken off before: of NIfTI and MGH it is usual, of the others it is none.
     pub fn from_magic(head: &[u8]) -> Option<Format> {
         if head.starts_with(b"NRRD00") {
             Some(Format::Nrrd)
@@ -110,6 +120,8 @@ impl Format {
             Some(Format::MetaImage)
         } else if begins_with_dicom_elements(head) {
             Some(Format::Dicom)
+        } else if begins_like_mgh(head) {
+            Some(Format::Mgh)
         } else {
             None
         }
@@ -134,6 +146,17 @@ fn begins_with_dicom_elements(head: &[u8]) -> bool {
     #[cfg(feature = "dicom")]
     return crate::dicom::begins_with_elements(head);
     #[cfg(not(feature = "dicom"))]
+    {
+        let _ = head;
+        false
+    }
+}
+
+/// MGH has no magic but its version, and the fields after it.
+fn begins_like_mgh(head: &[u8]) -> bool {
+    #[cfg(feature = "mgh")]
+    return crate::mgh::has_magic(head);
+    #[cfg(not(feature = "mgh"))]
     {
         let _ = head;
         false

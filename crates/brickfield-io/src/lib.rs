@@ -21,6 +21,8 @@ mod length_unit;
 mod limits;
 mod lines;
 pub mod metaimage;
+#[cfg(feature = "mgh")]
+pub mod mgh;
 #[cfg(feature = "nifti")]
 pub mod nifti;
 mod note;
@@ -48,6 +50,8 @@ pub mod tiff;
 pub mod vti;
 mod vtk_arrays;
 pub mod vtk_legacy;
+#[cfg(any(feature = "nifti", feature = "mgh"))]
+mod wrapped;
 
 pub use choice::{Choice, ChoiceKind, Selection};
 pub use error::{Damage, OpenError, ReadError, Shown};
@@ -63,7 +67,7 @@ pub use samples::ByteOrder;
 pub use save::{Compression, SAVED_EXTENSIONS, SaveError, SaveOptions, save};
 
 /// The scalar types that can be read, for messages.
-#[cfg(any(feature = "nifti", feature = "tiff"))]
+#[cfg(feature = "tiff")]
 pub(crate) const SCALARS: &str = "8, 16 and 32 bit integers, 32 and 64 bit floats are";
 
 /// The stored types that can be read, for messages.

@@ -53,7 +53,13 @@ impl CheckedShape {
         let voxel = voxel.into();
         voxel.check()?;
         let (stored, scalar) = (voxel.stored, voxel.stored.read_into());
-        let shape = CheckedShape { dims: UVec3::from(checked), scalar, voxel, limits: *limits };
+        let shape = CheckedShape {
+            dims: UVec3::from(checked),
+            scalar,
+            voxel,
+            #[cfg(feature = "gzip")]
+            limits: *limits,
+        };
         let what = |part: &str| format!("{part} of {} x {} x {} voxels of {stored}", dims[0], dims[1], dims[2]);
         let n_bytes = scalar.n_bytes().max(stored.n_bytes()) as u128;
         check_bytes(shape.n_voxels_claimed() * n_bytes, limits, || what("a volume"))?;
@@ -71,7 +77,6 @@ impl CheckedShape {
     }
 
     /// Bytes of all components in the file.
-    #[cfg(feature = "nifti")]
     pub(crate) fn n_stored_bytes(&self) -> u64 {
         self.n_voxels_claimed() as u64 * self.voxel.n_bytes() as u64
     }

@@ -78,8 +78,10 @@ fn detect_file(path: &Path) -> Result<Format, ReadError> {
     }
     let inner = ungzipped(&head);
     match Format::from_magic(inner.as_deref().unwrap_or(&head)) {
-        Some(format) if inner.is_none() || format == Format::Nifti => Ok(format),
-        Some(format) => Err(ReadError::unsupported("gzip around", format, "around NIfTI it is; unpack it first")),
+        Some(format) if inner.is_none() || format.may_be_gzipped() => Ok(format),
+        Some(format) => {
+            Err(ReadError::unsupported("gzip around", format, "around NIfTI and MGH it is; unpack it first"))
+        }
         None => match after_user_block(&mut file, path)? {
             Some(ForeignFormat { name, hint }) => Err(ReadError::unsupported("format", name, hint)),
             None => Format::from_extension(path).ok_or(ReadError::UnknownFormat { found: Shown::of_bytes(&head) }),
@@ -145,7 +147,14 @@ fn open_file(path: &Path, format: Format, options: &OpenOptions) -> Result<Opene
         Format::Nrrd => nrrd::read(file, &folder, options),
         Format::MetaImage => metaimage::read(file, &folder, options),
         #[cfg(feature = "nifti")]
+        Format::Nifti if is_image_of_pair(path) => {
+            let header = crate::wrapped::open_part(&format!("{}.hdr", stem(path)), &folder)?;
+            crate::nifti::read(header, &stem(path), &folder, options)
+        }
+        #[cfg(feature = "nifti")]
         Format::Nifti => crate::nifti::read(file, &stem(path), &folder, options),
+        #[cfg(feature = "mgh")]
+        Format::Mgh => crate::mgh::read(file, options),
         #[cfg(feature = "vti")]
         Format::Vti => crate::vti::read(file, &folder, options),
         Format::VtkLegacy => vtk_legacy::read(file, options),
@@ -194,6 +203,7 @@ fn open_folder(path: &Path, format: Format, options: &OpenOptions) -> Result<Ope
 fn feature_off(format: Format) -> ReadError {
     let feature = match format {
         Format::Nifti => "nifti",
+        Format::Mgh => "mgh",
         Format::Vti => "vti",
         Format::Dicom => "dicom",
         Format::OmeZarr => "ome-zarr",
@@ -208,12 +218,22 @@ fn file_name(path: &Path) -> String {
     path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// The file's name without `.hdr` or `.hdr.gz`.
+/// The file's name without `.hdr`, `.img`, `.hdr.gz` or `.img.gz`.
 #[cfg(feature = "nifti")]
 fn stem(path: &Path) -> String {
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let plain = name.strip_suffix(".gz").unwrap_or(&name);
     plain.rsplit_once('.').map_or(plain, |(stem, _)| stem).to_owned()
+}
+
+/// Whether the file has the samples of a NIfTI pair, by its name; a header in it is told by its content.
+#[cfg(feature = "nifti")]
+fn is_image_of_pair(path: &Path) -> bool {
+    let is_named = Format::from_extension(path) == Some(Format::Nifti);
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let head = || buffered(path).and_then(|mut file| read_head(&mut file, HEAD_BYTES)).unwrap_or_default();
+    let holds_header = |head: Vec<u8>| Format::from_magic(&ungzipped(&head).unwrap_or(head)) == Some(Format::Nifti);
+    is_named && name.trim_end_matches(".gz").ends_with(".img") && !holds_header(head())
 }
 
 /// Names of the regular files in a folder, in order.

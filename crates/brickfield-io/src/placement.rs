@@ -28,7 +28,7 @@ impl GridPlacement {
         GridPlacement { first_sample, steps }
     }
 
-    #[cfg(feature = "nifti")]
+    #[cfg(any(feature = "nifti", feature = "mgh"))]
     /// The same place with +x and +y negated: right-anterior-superior to left-posterior-superior and back.
     pub(crate) fn negated_xy(self) -> GridPlacement {
         self.scaled(DVec3::new(-1.0, -1.0, 1.0))

@@ -168,7 +168,7 @@ fn fill_counted(reader: &mut dyn Read, buffer: &mut [u8], n: &mut usize) -> std:
 }
 
 /// Reads until the buffer is full or the source ends, and names `what` in errors; bytes read.
-#[cfg(any(feature = "nifti", feature = "vti"))]
+#[cfg(any(feature = "nifti", feature = "mgh", feature = "vti"))]
 pub(crate) fn fill_named(reader: &mut dyn Read, buffer: &mut [u8], what: &str) -> Result<usize, ReadError> {
     let (mut n, expected_bytes) = (0, buffer.len() as u128);
     let outcome = fill_counted(reader, buffer, &mut n);

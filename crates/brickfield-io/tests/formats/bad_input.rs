@@ -55,7 +55,14 @@ pub(crate) fn cases() -> Vec<BadFile> {
         name: "v.nii",
         good: [crate::nifti::NiftiHeader::new(2).bytes(), vec![1; 24]].concat(),
         absurd: (b"\x03\0\x04\0\x03\0\x02\0", b"\x03\0\x00\x40\x00\x40\x00\x10", "1099511627776 bytes; the limit is"),
-        unsupported: (b"\0\0\x02\0\0\0", b"\0\0\x00\x04\0\0", "datatype \"int64 (code 1024)\" is not supported"),
+        unsupported: (b"\0\0\x02\0\0\0", b"\0\0\x00\x06\0\0", "datatype \"float128 (code 1536)\" is not supported"),
+    });
+    #[cfg(feature = "mgh")]
+    cases.push(BadFile {
+        name: "v.mgh",
+        good: [crate::mgh::MghHeader::new(0).bytes(), vec![1; 24]].concat(),
+        absurd: (b"\0\0\0\x04\0\0\0\x03", b"\0\x01\0\0\0\x80\0\0", "1099511627776 bytes; the limit is"),
+        unsupported: (b"\0\0\0\x01\0\0\0\0\0\0", b"\0\0\0\x01\0\0\0\x05\0\0", "type \"5\" is not supported"),
     });
     #[cfg(feature = "dicom")]
     cases.push(BadFile {

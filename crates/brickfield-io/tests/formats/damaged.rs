@@ -29,11 +29,16 @@ const TEXT: &[(&str, &str)] = &[
     ("v.nrrd", "not NRRD: the first line is \"hello world\", expected NRRD0001 to NRRD0005"),
     ("v.mha", "not MetaImage: the first line is \"hello world\", expected a key such as ObjectType or NDims, and ="),
     #[cfg(feature = "nifti")]
-    ("v.nii", "not NIfTI: the start of the file is \"hello world\\n\", expected 348, the length of its header"),
+    ("v.nii", "not NIfTI: the start of the file is \"hello world\\n\", expected 348 or 540, the length of its header"),
     #[cfg(feature = "nifti")]
-    ("v.nii.gz", "not NIfTI: the start of the file is \"hello world\\n\", expected 348, the length of its header"),
+    (
+        "v.nii.gz",
+        "not NIfTI: the start of the file is \"hello world\\n\", expected 348 or 540, the length of its header",
+    ),
     #[cfg(feature = "nifti")]
-    ("v.hdr", "not NIfTI: the start of the file is \"hello world\\n\", expected 348, the length of its header"),
+    ("v.hdr", "not NIfTI: the start of the file is \"hello world\\n\", expected 348 or 540, the length of its header"),
+    #[cfg(feature = "mgh")]
+    ("v.mgz", "not MGH: the start of the file is \"hello world\\n\", expected 1, the version, in four bytes"),
     #[cfg(feature = "vti")]
     (
         "v.vti",
@@ -160,11 +165,29 @@ mod packed {
             (10 + 5 + 352 + 24, at_end),
             (
                 10 + 5 + 350,
-                "the space before vox_offset holds 2 bytes, then its compressed data are cut off; 4 are promised",
+                "what is to be skipped of the image holds 350 bytes, then its compressed data are cut off; 352 are promised",
             ),
             (10 + 5 + 1, "the header holds 1 byte, then its compressed data are cut off; 348 are promised"),
         ];
         check(&cases.map(|(n, expected)| ("v.nii.gz", file[..n].to_vec(), expected)));
+    }
+
+    #[cfg(feature = "mgh")]
+    #[test]
+    fn mgh() {
+        let header = crate::mgh::MghHeader::new(0).bytes();
+        let file = gzip_unpressed(&[&header[..], DATA].concat());
+        let start = 10 + 5;
+        let cases = [
+            (start + 284 + 10, "the image holds 10 bytes, then its compressed data are cut off; 24 are promised"),
+            (start + 7, "the header holds 7 bytes, then its compressed data are cut off; 284 are promised"),
+        ];
+        check(&cases.map(|(n, expected)| ("v.mgz", file[..n].to_vec(), expected)));
+        let plain = [&header[..], DATA].concat();
+        check(&[
+            ("v.mgh", plain[..300].to_vec(), "the image holds 16 bytes; 24 are promised"),
+            ("v.mgh", plain[..283].to_vec(), "the header holds 283 bytes; 284 are promised"),
+        ]);
     }
 
     /// Appended raw data in zlib blocks of 10 bytes.

@@ -14,8 +14,12 @@ mod dicom_frames;
 #[cfg(feature = "dicom")]
 mod dicom_series;
 mod metaimage;
+#[cfg(feature = "mgh")]
+mod mgh;
 #[cfg(feature = "nifti")]
 mod nifti;
+#[cfg(feature = "nifti")]
+mod nifti_kinds;
 mod nrrd;
 mod nrrd_axes;
 #[cfg(feature = "ome-zarr")]

@@ -16,6 +16,18 @@ fn header(element: &str, more: &str, data_file: &str) -> String {
     )
 }
 
+/// Seeds for the fuzz target.
+pub(crate) fn examples() -> Vec<String> {
+    let file = |n_channels: usize, sizes: &str| {
+        format!(
+            "Modality: MET_MOD_CT\nNDims: 4\nDimSize: {sizes}\nElementType: MET_LONG_LONG\n\
+             ElementNumberOfChannels: {n_channels}\nBinaryData: False\nElementDataFile: LOCAL\n{}",
+            "1 ".repeat(24)
+        )
+    };
+    vec![file(1, "2 3 2 2"), file(3, "2 2 2 1"), file(4, "2 3 1 1")]
+}
+
 fn element(scalar: ScalarType) -> &'static str {
     match scalar {
         ScalarType::U8 => "MET_UCHAR",

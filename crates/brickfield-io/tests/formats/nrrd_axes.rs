@@ -7,6 +7,20 @@ use brickfield_io::{ChoiceKind, DataFiles, NoFiles, Note, Opened, ReadError, nrr
 
 use crate::common::*;
 
+/// Seeds for the fuzz target.
+pub(crate) fn examples() -> Vec<String> {
+    let more = [
+        "kinds: list domain domain domain",
+        "kinds: RGB-color domain domain domain",
+        "kinds: domain domain domain time",
+        "kinds: list domain domain domain\nSegment0_ID:=a\nSegment0_Layer:=2",
+    ];
+    let file = |more: &&str| {
+        format!("NRRD0004\ntype: int64\ndimension: 4\nsizes: 3 2 1 3\nencoding: ascii\n{more}\n\n{}", "1 ".repeat(18))
+    };
+    more.iter().map(file).collect()
+}
+
 /// Samples count up from 0.
 fn read(sizes: &str, more: &str, kind: ChoiceKind, wanted: Option<&str>) -> Result<Opened, ReadError> {
     read_with(sizes, more, true, &NoFiles, kind, wanted)

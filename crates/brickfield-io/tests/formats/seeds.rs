@@ -13,6 +13,7 @@ fn seeds_for_fuzzing() {
             Some(Format::Nrrd) => "nrrd",
             Some(Format::MetaImage) => "metaimage",
             Some(Format::Nifti) => "nifti",
+            Some(Format::Mgh) => "mgh",
             Some(Format::Vti) => "vti",
             Some(Format::VtkLegacy) => "vtk_legacy",
             _ => "dicom",
@@ -28,6 +29,20 @@ fn seeds_for_fuzzing() {
     }
     #[cfg(feature = "vti")]
     write(folder, "pvti", "0", &packed(&crate::vti_pieces::parallel()));
+    #[cfg(feature = "nifti")]
+    for (i, file) in crate::nifti_kinds::examples().iter().enumerate() {
+        write(folder, "nifti", &format!("{i}.nii"), file);
+    }
+    #[cfg(feature = "mgh")]
+    for (i, file) in crate::mgh::examples().iter().enumerate() {
+        write(folder, "mgh", &format!("{i}.mgh"), file);
+    }
+    for (i, file) in crate::nrrd_axes::examples().iter().enumerate() {
+        write(folder, "nrrd", &format!("{i}.nrrd"), file.as_bytes());
+    }
+    for (i, file) in crate::metaimage::examples().iter().enumerate() {
+        write(folder, "metaimage", &format!("{i}.mha"), file.as_bytes());
+    }
     #[cfg(feature = "ome-zarr")]
     for (i, entries) in crate::ome_zarr::examples().iter().chain(&crate::zarr_arrays::examples()).enumerate() {
         write(folder, "ome_zarr", &i.to_string(), &packed(entries));

@@ -1,0 +1,10 @@
+#![no_main]
+
+use std::io::Cursor;
+
+use brickfield_io::{Limits, mgh};
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| {
+    let _ = mgh::read(Cursor::new(bytes), &Limits { max_bytes: 1 << 20 }.into());
+});
