@@ -66,9 +66,5 @@ pub use raw::RawSpec;
 pub use samples::ByteOrder;
 pub use save::{Compression, SAVED_EXTENSIONS, SaveError, SaveOptions, save};
 
-/// The scalar types that can be read, for messages.
-#[cfg(feature = "tiff")]
-pub(crate) const SCALARS: &str = "8, 16 and 32 bit integers, 32 and 64 bit floats are";
-
 /// The stored types that can be read, for messages.
 pub(crate) const STORED_TYPES: &str = "8 to 64 bit integers, 32 and 64 bit floats are";

@@ -76,11 +76,6 @@ impl CheckedShape {
         self.n_voxels_claimed() as usize
     }
 
-    /// Bytes of all components in the file.
-    pub(crate) fn n_stored_bytes(&self) -> u64 {
-        self.n_voxels_claimed() as u64 * self.voxel.n_bytes() as u64
-    }
-
     /// The voxels that were read, in the type that they are to have: see [`StoredType::converted`](crate::stored_type::StoredType::converted).
     pub(crate) fn converted(&self, voxels: Voxels, notes: &mut Vec<Note>) -> Result<Voxels, ReadError> {
         self.voxel.stored.converted(voxels, notes)

@@ -76,7 +76,7 @@ fn read_from(names: &[String], files: &dyn DataFiles, options: &OpenOptions) -> 
     first.shown().into_iter().for_each(|shown| found.notes.push(Note::AsStored { shown }));
     let part = like.pixel.choose(&mut found)?;
     let dims = [like.width.into(), like.height.into(), names.len() as u64];
-    let shape = CheckedShape::claim(dims, part.scalar(like.stored), &options.limits)?;
+    let shape = CheckedShape::claim(dims, part.stored(like.stored), &options.limits)?;
     let grid = GridPlacement::axis_aligned(DVec3::ONE, DVec3::splat(0.5)).grid(shape.dims)?;
     let mut voxels = None;
     for name in &names {
@@ -84,7 +84,8 @@ fn read_from(names: &[String], files: &dyn DataFiles, options: &OpenOptions) -> 
         check_like(slice.shape(), name, like, names[0])?;
         slice.append(&mut voxels, &shape, part, &options.limits, &mut found.notes)?;
     }
-    found.finish(grid, voxels.ok_or(ReadError::Missing { field: "a picture" })?)
+    let voxels = shape.converted(voxels.ok_or(ReadError::Missing { field: "a picture" })?, &mut found.notes)?;
+    found.finish(grid, voxels)
 }
 
 /// The kind of picture that is read, and the files of it in natural order.

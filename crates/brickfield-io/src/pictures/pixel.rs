@@ -10,6 +10,8 @@ use crate::colour::{ColourPart, Colours};
 use crate::limits::{CheckedShape, Limits};
 use crate::opened::FileFacts;
 use crate::samples::{allocate, append_binary};
+use crate::stored_type::StoredType;
+use crate::stored_voxel::StoredVoxel;
 #[cfg(feature = "png")]
 use crate::stored_voxel::keep_components;
 use crate::{ByteOrder, ChoiceKind, Note, ReadError};
@@ -33,7 +35,7 @@ pub(crate) struct PictureShape {
     pub(crate) height: u32,
     pub(crate) depth: u32,
     /// The type of the samples.
-    pub(crate) stored: ScalarType,
+    pub(crate) stored: StoredType,
     pub(crate) pixel: Pixel,
 }
 
@@ -55,7 +57,7 @@ pub(crate) type Palette = [[u8; 3]];
 pub(crate) struct KeptSamples<'a> {
     pub(crate) bytes: &'a [u8],
     pub(crate) order: ByteOrder,
-    pub(crate) stored: ScalarType,
+    pub(crate) stored: StoredType,
     pub(crate) n_pixels: usize,
     pub(crate) palette: &'a Palette,
 }
@@ -158,9 +160,9 @@ impl PictureShape {
 
 impl PixelPart {
     /// The type of its values, from that of the samples.
-    pub(crate) fn scalar(self, stored: ScalarType) -> ScalarType {
+    pub(crate) fn stored(self, stored: StoredType) -> StoredType {
         match self {
-            PixelPart::Palette(_) => ScalarType::U8,
+            PixelPart::Palette(_) => ScalarType::U8.into(),
             PixelPart::Sample(_) | PixelPart::Luminance => stored,
         }
     }
@@ -183,18 +185,17 @@ impl PixelPart {
         what: &str,
     ) -> Result<(), ReadError> {
         let KeptSamples { mut bytes, order, stored, n_pixels, palette } = samples;
-        let dims = [self.kept().len() as u64, n_pixels as u64, 1];
-        let mut read = |n| {
-            let mut values = allocate(&CheckedShape::claim(dims, stored, limits)?)?;
-            append_binary(&mut values, &mut bytes, n, stored, order, what).map(|()| values)
-        };
         match self {
             PixelPart::Sample(_) => append_binary(voxels, &mut bytes, n_pixels, stored, order, what),
             PixelPart::Luminance => {
-                extend(voxels, Colours::Rgb.reduce(read(3 * n_pixels)?, ColourPart::Luminance));
-                Ok(())
+                let rgb = StoredVoxel { stored, n_components: 3, part: ColourPart::Luminance };
+                append_binary(voxels, &mut bytes, n_pixels, rgb, order, what)
             }
-            PixelPart::Palette(part) => look_up(voxels, read(n_pixels)?, &values_of(palette, part), what),
+            PixelPart::Palette(part) => {
+                let mut numbers = allocate(&CheckedShape::claim([n_pixels as u64, 1, 1], stored, limits)?)?;
+                append_binary(&mut numbers, &mut bytes, n_pixels, stored, order, what)?;
+                look_up(voxels, numbers, &values_of(palette, part), what)
+            }
         }
     }
 }
@@ -225,17 +226,4 @@ fn look_up(voxels: &mut Voxels, numbers: Voxels, values: &[u8], what: &str) -> R
         }
     });
     Ok(())
-}
-
-/// Appends voxels of the same type.
-fn extend(voxels: &mut Voxels, more: Voxels) {
-    macro_rules! of_types {
-        ($($variant:ident)*) => {
-            match (voxels, more) {
-                $((Voxels::$variant(all), Voxels::$variant(more)) => all.extend(more),)*
-                _ => debug_assert!(false, "one type for all slices"),
-            }
-        };
-    }
-    of_types! { U8 I8 U16 I16 U32 I32 F32 F64 }
 }

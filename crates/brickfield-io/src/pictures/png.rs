@@ -29,7 +29,7 @@ impl<'a> PngSlice<'a> {
         let reader = decoder.read_info().map_err(|e| ReadError::decoder("the PNG header", e))?;
         let info = reader.info();
         let n_bits = info.bit_depth as usize;
-        let stored = if info.bit_depth == BitDepth::Sixteen { ScalarType::U16 } else { ScalarType::U8 };
+        let stored = if info.bit_depth == BitDepth::Sixteen { ScalarType::U16 } else { ScalarType::U8 }.into();
         let pixel = match info.color_type {
             ColorType::Grayscale => Pixel::Grey,
             ColorType::GrayscaleAlpha => Pixel::Named(&["grey", "alpha"]),

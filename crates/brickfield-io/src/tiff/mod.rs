@@ -2,7 +2,7 @@
 //!
 //! Which page is which slice, and the spacing, come from the description that ImageJ or OME-TIFF write; without one the
 //! pages are in order and the spacing is 1, for the resolution tags of other writers are about paper. Strips and tiles
-//! are decoded here, with decompressors from crates. Not: samples of 64-bit integers and 16-bit floats, fax, JPEG 2000.
+//! are decoded here, with decompressors from crates. Not: fax, JPEG 2000.
 
 mod chunks;
 mod directory;
@@ -54,7 +54,7 @@ fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenO
     let part = choose_part(&stack, &page, &mut found)?;
     let PictureShape { width, height, depth, stored, .. } = page.shape;
     let dims = [width.into(), height.into(), stack.n_planes.saturating_mul(depth.into())];
-    let shape = CheckedShape::claim(dims, part.scalar(stored), &options.limits)?;
+    let shape = CheckedShape::claim(dims, part.stored(stored), &options.limits)?;
     let (spacing, unit) = stack.spacing(&mut found.notes);
     let spacing = spacing * coarsening(&finest.shape, &page.shape);
     let grid = GridPlacement::axis_aligned(spacing, 0.5 * spacing).grid(shape.dims)?;
@@ -62,6 +62,7 @@ fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenO
     let planes =
         PlaneReader { level, part, like: page.shape, limits: options.limits, n_chunks: 0, n_missing_chunks: 0 };
     let voxels = planes.read_all(&stack, &mut files, &shape, &mut found.notes)?;
+    let voxels = shape.converted(voxels, &mut found.notes)?;
     found.finish(grid, voxels)
 }
 

@@ -9,6 +9,7 @@ use crate::ReadError;
 use crate::colour::Colours;
 use crate::limits::{Limits, check_bytes};
 use crate::pictures::{PictureShape, Pixel};
+use crate::stored_type::StoredType;
 
 mod tag {
     pub(super) const WIDTH: u16 = 256;
@@ -132,7 +133,7 @@ impl Tags<'_, '_> {
     }
 
     /// Bits of a stored sample, and the type that it is read as.
-    fn sample_type(&mut self) -> Result<(usize, ScalarType), ReadError> {
+    fn sample_type(&mut self) -> Result<(usize, StoredType), ReadError> {
         let one = |values: Option<Vec<u64>>, default| {
             let values = values.filter(|v| !v.is_empty()).unwrap_or_else(|| vec![default]);
             values.iter().all(|v| *v == values[0]).then_some(values[0]).ok_or(values)
@@ -153,6 +154,9 @@ impl Tags<'_, '_> {
             (SIGNED, 8) => ScalarType::I8,
             (SIGNED, 16) => ScalarType::I16,
             (SIGNED, 32) => ScalarType::I32,
+            (UNSIGNED | UNDEFINED, 64) => return Ok((64, StoredType::U64)),
+            (SIGNED, 64) => return Ok((64, StoredType::I64)),
+            (FLOAT, 16) => return Ok((16, StoredType::F16)),
             (FLOAT, 32) => ScalarType::F32,
             (FLOAT, 64) => ScalarType::F64,
             _ => {
@@ -163,10 +167,10 @@ impl Tags<'_, '_> {
                     _ => "complex or unknown numbers",
                 };
                 let value = format!("{kind} of {bits} bits");
-                return Err(ReadError::unsupported("sample type", value, crate::SCALARS));
+                return Err(ReadError::unsupported("sample type", value, crate::STORED_TYPES));
             }
         };
-        Ok((bits as usize, scalar))
+        Ok((bits as usize, scalar.into()))
     }
 
     fn pixel(&mut self, photometric: u64, n_samples: u16, compression: PageCompression) -> Result<Pixel, ReadError> {
