@@ -33,7 +33,7 @@ import tempfile
 
 import numpy as np
 
-MODULES = ["dicom", "tiff", "stored"]
+MODULES = ["dicom", "tiff", "stored", "nrrd_nifti"]
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 NRRD_TYPES = {
     "uint8": "u1", "int8": "i1", "uint16": "<u2", "int16": "<i2", "uint32": "<u4", "int32": "<i4", "float": "<f4", "double": "<f8",
