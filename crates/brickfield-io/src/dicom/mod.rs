@@ -86,7 +86,7 @@ fn read_headers(names: &[String], files: &dyn DataFiles, limits: &Limits) -> (Ve
     for name in names {
         match read_slices(name, files, limits) {
             Ok(mut of_file) => slices.append(&mut of_file),
-            Err(fault) => unread.push(fault),
+            Err(file) => unread.push(*file),
         }
     }
     (slices, unread)

@@ -67,8 +67,8 @@ impl Unread {
 }
 
 /// The slices of a file; none of an index (DICOMDIR).
-pub(super) fn read_slices(name: &str, files: &dyn DataFiles, limits: &Limits) -> Result<Vec<Slice>, Unread> {
-    let unread = |series, fault| Unread { name: name.to_owned(), series, fault };
+pub(super) fn read_slices(name: &str, files: &dyn DataFiles, limits: &Limits) -> Result<Vec<Slice>, Box<Unread>> {
+    let unread = |series, fault| Box::new(Unread { name: name.to_owned(), series, fault });
     let mut data_set = open_data_set(name, files, limits).map_err(|fault| unread(None, fault))?;
     let (parsed, outcome) = data_set.parse();
     let elements = parsed.elements;

@@ -167,7 +167,7 @@ impl Tags<'_, '_> {
                     _ => "complex or unknown numbers",
                 };
                 let value = format!("{kind} of {bits} bits");
-                return Err(ReadError::unsupported("sample type", value, crate::STORED_TYPES));
+                return Err(ReadError::unsupported("sample type", value, SAMPLE_TYPES));
             }
         };
         Ok((bits as usize, scalar.into()))
@@ -216,6 +216,7 @@ impl Tags<'_, '_> {
     }
 }
 
+const SAMPLE_TYPES: &str = "integers of 1 to 16, 32 and 64 bits, floats of 16, 32 and 64 bits are";
 const UNSIGNED: u64 = 1;
 const SIGNED: u64 = 2;
 const FLOAT: u64 = 3;
