@@ -92,16 +92,16 @@ impl Choice {
 /// The entries that a caller wants, by number (from 0) or by name. A kind that is not mentioned is left to the file:
 /// its first entry is read, and of colours the luminance.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Selection(BTreeMap<ChoiceKind, String>);
+pub struct WantedEntries(BTreeMap<ChoiceKind, String>);
 
-impl Selection {
+impl WantedEntries {
     /// Nothing is wanted in particular.
-    pub fn new() -> Selection {
-        Selection::default()
+    pub fn new() -> WantedEntries {
+        WantedEntries::default()
     }
 
     /// Wants an entry, by its number or by its name; an earlier wish of this kind is replaced.
-    pub fn select(&mut self, kind: ChoiceKind, entry: impl Into<String>) {
+    pub fn want(&mut self, kind: ChoiceKind, entry: impl Into<String>) {
         self.0.insert(kind, entry.into());
     }
 
@@ -111,10 +111,10 @@ impl Selection {
     }
 }
 
-/// The choices that a reader offers while it reads, each held against the [`Selection`].
+/// The choices that a reader offers while it reads, each held against the [`WantedEntries`].
 #[derive(Debug)]
 pub(crate) struct Choices {
-    wanted: Selection,
+    wanted: WantedEntries,
     made: Vec<Choice>,
 }
 
@@ -141,7 +141,7 @@ pub(crate) struct Chosen {
 }
 
 impl Choices {
-    pub(crate) fn new(wanted: Selection) -> Choices {
+    pub(crate) fn new(wanted: WantedEntries) -> Choices {
         Choices { wanted, made: Vec::new() }
     }
 
@@ -212,12 +212,12 @@ mod tests {
     use super::*;
 
     fn chosen(wanted: Option<&str>, names: &[&str]) -> Result<Chosen, ReadError> {
-        let mut selection = Selection::new();
+        let mut wanted_entries = WantedEntries::new();
         if let Some(wanted) = wanted {
-            selection.select(ChoiceKind::Channel, wanted);
+            wanted_entries.want(ChoiceKind::Channel, wanted);
         }
         let names = names.iter().map(|name| (*name).to_owned()).collect();
-        Choices::new(selection).choose(ChoiceKind::Channel, Entries::Named(names), 0)
+        Choices::new(wanted_entries).choose(ChoiceKind::Channel, Entries::Named(names), 0)
     }
 
     #[test]
@@ -240,9 +240,9 @@ mod tests {
     #[test]
     fn a_wish_that_no_reader_asked_for_is_an_error() {
         let unasked = |entry: &str| {
-            let mut selection = Selection::new();
-            selection.select(ChoiceKind::Time, entry);
-            Choices::new(selection).finish()
+            let mut wanted_entries = WantedEntries::new();
+            wanted_entries.want(ChoiceKind::Time, entry);
+            Choices::new(wanted_entries).finish()
         };
         assert_eq!(unasked("0").unwrap(), vec![]);
         assert!(unasked("3").unwrap_err().to_string().contains("one time only"));

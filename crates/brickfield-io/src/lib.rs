@@ -53,7 +53,7 @@ pub mod vtk_legacy;
 #[cfg(any(feature = "nifti", feature = "mgh"))]
 mod wrapped;
 
-pub use choice::{Choice, ChoiceKind, Selection};
+pub use choice::{Choice, ChoiceKind, WantedEntries};
 pub use error::{Damage, OpenError, ReadError, Shown};
 pub use files::{ByteSource, DataFiles, Folder, NoFiles};
 pub use format::Format;

@@ -50,7 +50,7 @@ pub(crate) struct FileFacts {
 
 impl FileFacts {
     pub(crate) fn plain(format: Format, options: &OpenOptions) -> FileFacts {
-        let (choices, spacing) = (Choices::new(options.selection.clone()), options.spacing);
+        let (choices, spacing) = (Choices::new(options.wanted.clone()), options.spacing);
         FileFacts { format, frame: WorldFrame::Plain, unit: None, notes: Vec::new(), choices, spacing }
     }
 

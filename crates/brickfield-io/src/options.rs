@@ -2,7 +2,7 @@
 
 use brickfield_core::glam::DVec3;
 
-use crate::{Limits, Selection};
+use crate::{Limits, WantedEntries};
 
 /// What a caller wants of a file, and how much may be allocated for it.
 ///
@@ -10,7 +10,7 @@ use crate::{Limits, Selection};
 /// use brickfield_io::{ChoiceKind, OpenOptions};
 /// let mut options = OpenOptions::default();
 /// options.limits.max_bytes = 1 << 30;
-/// options.selection.select(ChoiceKind::Channel, "DAPI");
+/// options.wanted.want(ChoiceKind::Channel, "DAPI");
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -18,7 +18,7 @@ pub struct OpenOptions {
     /// How much may be allocated.
     pub limits: Limits,
     /// The entries that are read where the file has several.
-    pub selection: Selection,
+    pub wanted: WantedEntries,
     /// World units between samples, in place of what the file states.
     pub spacing: Option<DVec3>,
 }

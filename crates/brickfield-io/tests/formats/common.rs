@@ -17,7 +17,7 @@ pub(crate) fn options() -> OpenOptions {
 /// The same, with an entry wanted.
 pub(crate) fn selecting(kind: ChoiceKind, wanted: Option<&str>) -> OpenOptions {
     let mut options = options();
-    wanted.into_iter().for_each(|entry| options.selection.select(kind, entry));
+    wanted.into_iter().for_each(|entry| options.wanted.want(kind, entry));
     options
 }
 

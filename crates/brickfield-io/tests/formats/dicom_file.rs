@@ -158,7 +158,7 @@ pub(crate) fn read_all(files: Vec<Vec<u8>>, wanted: &[(ChoiceKind, &str)]) -> Re
     let names: Vec<String> = files.keys().cloned().collect();
     let mut options: OpenOptions = options();
     for (kind, entry) in wanted {
-        options.selection.select(*kind, *entry);
+        options.wanted.want(*kind, *entry);
     }
     dicom::read(&names, &files, &options)
 }

@@ -138,7 +138,7 @@ fn times_and_components_are_chosen() {
     assert_eq!(third.volume.voxels(), &Voxels::U8((48..72).collect()));
     let both = NiftiHeader { dim: [5, 4, 3, 1, 2, 5, 1, 1], ..NiftiHeader::new(2) };
     let mut options = selecting(ChoiceKind::Channel, Some("3"));
-    options.selection.select(ChoiceKind::Time, "1");
+    options.wanted.want(ChoiceKind::Time, "1");
     let file = [both.bytes(), data.clone()].concat();
     let opened = nifti::read(Cursor::new(file), "", &NoFiles, &options).unwrap();
     assert_eq!(opened.volume.voxels(), &Voxels::U8((84..96).collect()));

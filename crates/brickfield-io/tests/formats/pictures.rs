@@ -90,7 +90,7 @@ mod of_png {
     #[track_caller]
     fn check(file: Vec<u8>, channel: Option<&str>, expected: impl Into<Voxels>, notes: &[Note]) {
         let mut options: OpenOptions = options();
-        channel.into_iter().for_each(|entry| options.selection.select(ChoiceKind::Channel, entry));
+        channel.into_iter().for_each(|entry| options.wanted.want(ChoiceKind::Channel, entry));
         let opened = read_with(&[named("1.png", file)].into(), &options).unwrap();
         assert_eq!((opened.volume.voxels(), &opened.notes[..]), (&expected.into(), notes));
     }

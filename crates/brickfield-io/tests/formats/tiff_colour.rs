@@ -10,7 +10,7 @@ use crate::tiff_bytes::{PageBytes, tiff};
 
 fn read(pages: &[PageBytes], channel: Option<&str>) -> Result<Opened, ReadError> {
     let mut options: OpenOptions = options();
-    channel.into_iter().for_each(|entry| options.selection.select(ChoiceKind::Channel, entry));
+    channel.into_iter().for_each(|entry| options.wanted.want(ChoiceKind::Channel, entry));
     brickfield_io::tiff::read(Cursor::new(tiff(pages)), &NoFiles, &options)
 }
 

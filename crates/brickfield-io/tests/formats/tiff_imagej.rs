@@ -25,7 +25,7 @@ fn slices(opened: &Opened) -> Vec<u8> {
 
 fn read_with(file: Vec<u8>, choices: &[(ChoiceKind, &str)]) -> Result<Opened, ReadError> {
     let mut options: OpenOptions = options();
-    choices.iter().for_each(|(kind, entry)| options.selection.select(*kind, *entry));
+    choices.iter().for_each(|(kind, entry)| options.wanted.want(*kind, *entry));
     brickfield_io::tiff::read(std::io::Cursor::new(file), &NoFiles, &options)
 }
 

@@ -37,7 +37,7 @@ fn read_with(
     choices: &[(ChoiceKind, &str)],
 ) -> Result<Opened, ReadError> {
     let mut options: OpenOptions = options();
-    choices.iter().for_each(|(kind, entry)| options.selection.select(*kind, *entry));
+    choices.iter().for_each(|(kind, entry)| options.wanted.want(*kind, *entry));
     tiff::read(Cursor::new(bytes), files, &options)
 }
 

@@ -153,7 +153,7 @@ fn the_active_scalars_of_several_arrays() {
     let vector = read(&named).unwrap_err().to_string();
     assert_eq!(vector, "DataArray \"b\" holds 1 sample; 72 are promised");
     let mut options = options();
-    options.selection.select(ChoiceKind::Array, "a");
+    options.wanted.want(ChoiceKind::Array, "a");
     assert!(vti::read(Cursor::new(named), &NoFiles, &options).unwrap().notes.is_empty());
 }
 
@@ -220,7 +220,7 @@ fn blocks_of_lz4_and_lzma() {
 fn components_colours_wide_integers_and_bits() {
     let wanting = |file: String, entry: &str| {
         let mut options = options();
-        options.selection.select(ChoiceKind::Channel, entry);
+        options.wanted.want(ChoiceKind::Channel, entry);
         vti::read(Cursor::new(file), &NoFiles, &options)
     };
     let numbers = |n: i32| (0..n).map(|i| i.to_string()).collect::<Vec<_>>().join(" ");

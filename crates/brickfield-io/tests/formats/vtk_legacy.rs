@@ -12,7 +12,7 @@ fn read(file: &[u8]) -> Result<Opened, ReadError> {
 
 fn wanting(file: &[u8], kind: ChoiceKind, entry: &str) -> Result<Opened, ReadError> {
     let mut options = options();
-    options.selection.select(kind, entry);
+    options.wanted.want(kind, entry);
     vtk_legacy::read(Cursor::new(file), &options)
 }
 
@@ -126,8 +126,8 @@ fn arrays_are_chosen_by_name() {
         let colours = array("c");
         assert_eq!(colours.notes, [Note::Luminance]);
         let mut options = options();
-        options.selection.select(ChoiceKind::Array, "c");
-        options.selection.select(ChoiceKind::Channel, "green");
+        options.wanted.want(ChoiceKind::Array, "c");
+        options.wanted.want(ChoiceKind::Channel, "green");
         let green = vtk_legacy::read(Cursor::new(&file), &options).unwrap();
         assert_eq!(green.volume.voxels(), &Voxels::U8((0..24).map(|i| 3 * i + 1).collect()));
     }

@@ -14,7 +14,7 @@ fn read(entries: &Entries) -> Result<Opened, ReadError> {
 fn wanting(entries: &Entries, wishes: &[(ChoiceKind, &str)]) -> Result<Opened, ReadError> {
     let mut options = options();
     for (kind, entry) in wishes {
-        options.selection.select(*kind, *entry);
+        options.wanted.want(*kind, *entry);
     }
     ome_zarr::read_entries(entries, &options)
 }

@@ -32,13 +32,13 @@ pub struct InputOptions {
     pub spacing: Option<DVec3>,
     /// The entries that are read where the file has several.
     #[command(flatten)]
-    pub selection: SelectionOptions,
+    pub entries: EntryOptions,
 }
 
 /// Which entry is read where a file has several: its number, from 0, or its name, as `brickfield info` lists them.
 #[derive(Args, Clone, Debug, Default)]
 #[allow(missing_docs)]
-pub struct SelectionOptions {
+pub struct EntryOptions {
     /// DICOM series: its number, from 0, or its UID; as all of these, `info` lists them, and the first one is the default
     #[arg(long, value_name = "WHICH")]
     pub series: Option<String>,
@@ -226,7 +226,7 @@ impl InputOptions {
     fn open_options(&self) -> OpenOptions {
         let mut options = OpenOptions::from(self.limits());
         options.spacing = self.spacing;
-        let SelectionOptions { series, image, array, level, channel, time } = &self.selection;
+        let EntryOptions { series, image, array, level, channel, time } = &self.entries;
         let wanted = [
             (ChoiceKind::Series, series),
             (ChoiceKind::Image, image),
@@ -237,7 +237,7 @@ impl InputOptions {
         ];
         for (kind, entry) in wanted {
             if let Some(entry) = entry {
-                options.selection.select(kind, entry);
+                options.wanted.want(kind, entry);
             }
         }
         options
