@@ -12,13 +12,16 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import nibabel.nicom.dicomwrappers as nibabel_dicom
 import pydicom
 import SimpleITK as sitk
 from pydicom.dataset import Dataset, FileDataset, FileMetaDataset
 from pydicom.encaps import encapsulate
 from pydicom.sequence import Sequence
 from pydicom import uid
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")
+    import nibabel.nicom.dicomwrappers as nibabel_dicom
 
 SHAPE = (5, 40, 37)
 SPACING = (0.5, 0.75, 2.5)
@@ -443,7 +446,6 @@ def read_by_itk(path, kind):
 
 
 def read_by_nibabel(path):
-    warnings.simplefilter("ignore")
     image = nibabel_dicom.wrapper_from_file(str(path))
     # Its axes are rows, columns, slices.
     affine = image.affine[:, [1, 0, 2, 3]]

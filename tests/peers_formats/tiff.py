@@ -59,6 +59,13 @@ def layouts(folder):
             path = os.path.join(folder, name + ".tif")
             tifffile.imwrite(path, ramp(dtype), byteorder=order, photometric="minisblack", metadata=None)
             yield name, path, plain(tifffile.imread(path))
+    for dtype in ("i8", "u8", "f2"):
+        for order in "<>":
+            name = f"layout-{dtype}-{'little' if order == '<' else 'big'}"
+            path = os.path.join(folder, name + ".tif")
+            values = (ramp("i2") if dtype != "u8" else ramp("u2")).astype(dtype)
+            tifffile.imwrite(path, values, byteorder=order, photometric="minisblack", metadata=None)
+            yield name, path, plain(tifffile.imread(path))
     cases = {
         "bigtiff": dict(bigtiff=True),
         "strips-of-5-rows": dict(rowsperstrip=5),

@@ -96,6 +96,22 @@ fn samples_of_less_than_a_byte_and_between() {
 }
 
 #[test]
+fn wide_integers_and_half_floats_become_a_scalar_type() {
+    let page = |n_bits, format, samples| tiff(&[PageBytes::grey(2, 1, n_bits, samples).with(339, &[format])]);
+    let converted = |file, from, to| {
+        let opened = read(file).unwrap();
+        assert_eq!(opened.notes, [Note::Converted { from, to }]);
+        opened.volume.voxels().clone()
+    };
+    let le64 = |values: [i64; 2]| values.map(i64::to_le_bytes).concat();
+    assert_eq!(converted(page(64, 1, le64([7, 300])), "uint64", ScalarType::U16), Voxels::U16(vec![7, 300]));
+    assert_eq!(converted(page(64, 2, le64([-7, 3])), "int64", ScalarType::I8), Voxels::I8(vec![-7, 3]));
+    let halves = le16([0x3c00, 0xc100]);
+    assert_eq!(converted(page(16, 3, halves), "float16", ScalarType::F32), Voxels::F32(vec![1.0, -2.5]));
+    assert!(refusal(page(64, 2, le64([1 << 53 | 1, 0]))).contains("9007199254740992"));
+}
+
+#[test]
 fn differences_between_neighbours_are_summed() {
     let page = PageBytes::grey(4, 2, 8, vec![1, 1, 1, 1, 10, 255, 255, 2]).with(317, &[2]).packed(5, lzw);
     assert_eq!(voxels(tiff(&[page])), Voxels::U8(vec![1, 2, 3, 4, 10, 9, 8, 10]));
