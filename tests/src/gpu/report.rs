@@ -229,7 +229,9 @@ impl GpuReport {
 impl Versions {
     /// The versions of this build; `commit` is the one that the caller states.
     pub(super) fn here(commit: Option<&str>) -> Versions {
-        let of = |name: &str| locked(include_str!(env!("BRICKFIELD_LOCK_FILE")), name).unwrap_or_else(|| "unknown".to_owned());
+        let of = |name: &str| {
+            locked(include_str!(env!("BRICKFIELD_LOCK_FILE")), name).unwrap_or_else(|| "unknown".to_owned())
+        };
         Versions {
             brickfield: env!("CARGO_PKG_VERSION").to_owned(),
             commit: commit.map_or_else(crate::report::commit, str::to_owned),
