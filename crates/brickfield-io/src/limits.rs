@@ -53,13 +53,7 @@ impl CheckedShape {
         let voxel = voxel.into();
         voxel.check()?;
         let (stored, scalar) = (voxel.stored, voxel.stored.read_into());
-        let shape = CheckedShape {
-            dims: UVec3::from(checked),
-            scalar,
-            voxel,
-            #[cfg(feature = "gzip")]
-            limits: *limits,
-        };
+        let shape = CheckedShape { dims: UVec3::from(checked), scalar, voxel, limits: *limits };
         let what = |part: &str| format!("{part} of {} x {} x {} voxels of {stored}", dims[0], dims[1], dims[2]);
         let n_bytes = scalar.n_bytes().max(stored.n_bytes()) as u128;
         check_bytes(shape.n_voxels_claimed() * n_bytes, limits, || what("a volume"))?;

@@ -209,7 +209,7 @@ mod tests {
 
     #[test]
     fn burnt_in_letters_do_not_hide_the_head() {
-        let is_letter = |p: UVec3| p.x < 6 && p.y < 9 && (30..33).contains(&p.z) && (p.x + p.y) % 2 == 0;
+        let is_letter = |p: UVec3| p.x < 6 && p.y < 9 && (30..33).contains(&p.z) && (p.x + p.y).is_multiple_of(2);
         let is_head = |p: UVec3| radius(p) < 1.0;
         for (letters, spread) in [(255.0, 0.0), (1000.0, 0.0), (1000.0, 400.0), (8000.0, 3000.0)] {
             let volume = cube(64, 1.0, |p| {
