@@ -33,6 +33,17 @@ impl<'a> HeaderLines<'a> {
         let text = String::from_utf8_lossy(&line);
         Ok((n > 0).then(|| text.trim_end_matches(['\n', '\r']).to_owned()))
     }
+
+    /// The lines that are not blank, to the end of the file, without white space around them.
+    pub(crate) fn rest(&mut self) -> Result<Vec<String>, ReadError> {
+        let mut lines = Vec::new();
+        while let Some(line) = self.next_line()? {
+            if !line.trim().is_empty() {
+                lines.push(line.trim().to_owned());
+            }
+        }
+        Ok(lines)
+    }
 }
 
 /// All numbers of a white-space separated field.

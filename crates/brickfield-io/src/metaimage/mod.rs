@@ -270,7 +270,7 @@ fn file_names(value: &str, sizes: &[u64], lines: &mut HeaderLines) -> Result<Opt
     Ok(Some(match *words.as_slice() {
         [] => return Err(ReadError::field("ElementDataFile", value, "LOCAL, LIST, a pattern or a file name")),
         ["LOCAL" | "Local" | "local"] => return Ok(None),
-        ["LIST", ..] => FileNames::List(read_list(lines)?),
+        ["LIST", ..] => FileNames::List(lines.rest()?),
         [pattern, first, last, step] if pattern.contains('%') => FileNames::numbered(pattern, [first, last, step])?,
         [pattern, first, last] if pattern.contains('%') => FileNames::numbered(pattern, [first, last, "1"])?,
         [pattern] if pattern.contains('%') => {
@@ -279,14 +279,4 @@ fn file_names(value: &str, sizes: &[u64], lines: &mut HeaderLines) -> Result<Opt
         }
         _ => FileNames::One(value.to_owned()),
     }))
-}
-
-fn read_list(lines: &mut HeaderLines) -> Result<Vec<String>, ReadError> {
-    let mut names = Vec::new();
-    while let Some(line) = lines.next_line()? {
-        if !line.trim().is_empty() {
-            names.push(line.trim().to_owned());
-        }
-    }
-    Ok(names)
 }

@@ -39,7 +39,7 @@ impl NrrdHeader {
             }
             header.add(&line);
             if header.text("datafile").is_some_and(|v| v.split_whitespace().next() == Some("LIST")) {
-                header.data_files = read_list(&mut lines)?;
+                header.data_files = lines.rest()?;
                 break;
             }
         }
@@ -211,14 +211,4 @@ fn check_magic(line: &str) -> Result<(), ReadError> {
             expected: "NRRD0001 to NRRD0005",
         }),
     }
-}
-
-fn read_list(lines: &mut HeaderLines) -> Result<Vec<String>, ReadError> {
-    let mut names = Vec::new();
-    while let Some(line) = lines.next_line()? {
-        if !line.trim().is_empty() {
-            names.push(line.trim().to_owned());
-        }
-    }
-    Ok(names)
 }
