@@ -4,7 +4,7 @@ use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Grid, Scalar, Volume, Voxels, with_voxels};
 
 use crate::limits::CheckedShape;
-use crate::samples::with_room;
+use crate::numbers::with_room;
 use crate::{Limits, Note, Opened};
 
 /// Most even slices for each uneven one: stacks with wider gaps stay as they are.

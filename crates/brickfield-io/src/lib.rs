@@ -27,19 +27,25 @@ pub mod mgh;
 pub mod nifti;
 mod note;
 pub mod nrrd;
+mod numbers;
 #[cfg(feature = "ome-zarr")]
 pub mod ome_zarr;
 mod open;
 mod opened;
 mod options;
 #[cfg(any(feature = "tiff", feature = "png"))]
+mod packed_bits;
+#[cfg(any(feature = "tiff", feature = "png"))]
 pub mod pictures;
+#[cfg(any(feature = "tiff", feature = "png"))]
+mod pixel;
 mod placement;
 pub mod raw;
 #[cfg(any(feature = "nifti", feature = "dicom"))]
 mod rescale;
 mod samples;
 mod save;
+mod saved;
 mod series;
 mod stored;
 mod stored_type;
@@ -59,12 +65,13 @@ pub use files::{ByteSource, DataFiles, Folder, NoFiles};
 pub use format::Format;
 pub use limits::Limits;
 pub use note::Note;
+pub use numbers::ByteOrder;
 pub use open::{detect, open, open_raw};
 pub use opened::{Opened, WorldFrame};
 pub use options::OpenOptions;
 pub use raw::RawSpec;
-pub use samples::ByteOrder;
-pub use save::{Compression, SAVED_EXTENSIONS, SaveError, SaveOptions, save};
+pub use save::save;
+pub use saved::{Compression, SAVED_EXTENSIONS, SaveError, SaveOptions};
 
 /// The stored types that can be read, for messages.
 pub(crate) const STORED_TYPES: &str = "8 to 64 bit integers, 32 and 64 bit floats are";

@@ -9,7 +9,7 @@ use brickfield_core::{ScalarType, Volume};
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
 use crate::placement::GridPlacement;
-use crate::save::{SaveError, save_atomically, values, write_samples};
+use crate::saved::{SaveError, save_atomically, values, write_samples};
 use crate::stored::{ByteSkip, DataFile, Encoding, StoredSamples};
 use crate::{ByteOrder, Format, OpenOptions, Opened, ReadError};
 

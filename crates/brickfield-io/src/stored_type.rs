@@ -4,8 +4,8 @@ use std::fmt;
 
 use brickfield_core::{Scalar, ScalarType, Voxels, with_voxels};
 
-use crate::samples::{FileScalar, with_room};
-use crate::{ByteOrder, Note, ReadError};
+use crate::numbers::{ByteOrder, FileScalar, with_room};
+use crate::{Note, ReadError};
 
 /// The type of a sample in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

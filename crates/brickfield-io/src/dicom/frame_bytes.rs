@@ -111,7 +111,7 @@ impl OpenFile<'_> {
 
     /// Bytes that lie within the file, by the walk over its elements.
     fn bytes(&mut self, start: u64, n_bytes: u64) -> Result<Vec<u8>, ReadError> {
-        let mut bytes = crate::samples::with_room(n_bytes as usize)?;
+        let mut bytes = crate::numbers::with_room(n_bytes as usize)?;
         bytes.resize(n_bytes as usize, 0);
         let source = &mut *self.data_set.source;
         let fault = |e| ReadError::io("the pixel data", e);

@@ -5,13 +5,44 @@ use std::rc::Rc;
 use brickfield_core::glam::DVec3;
 
 use super::elements::DataSet;
-use super::image::Image;
+use super::image::{Image, series};
 use super::mosaic;
 use super::slice::{SPACING_BETWEEN_SLICES, Scopes, Slice, StepFrom};
+use super::source::open_data_set;
 use super::tags;
-use crate::ReadError;
+use crate::{DataFiles, Limits, ReadError};
 
-pub(super) fn slices_of(image: Rc<Image>, elements: &DataSet) -> Result<Vec<Slice>, ReadError> {
+/// A file that gave no slices.
+pub(super) struct Unread {
+    pub(super) name: String,
+    /// The series it is of, if that much could be read.
+    pub(super) series: Option<String>,
+    pub(super) fault: ReadError,
+}
+
+impl Unread {
+    /// The fault with the name of the file.
+    pub(super) fn into_fault(self) -> ReadError {
+        ReadError::decoder(format!("slice {:?}", self.name), self.fault)
+    }
+}
+
+/// The slices of a file; none of an index (DICOMDIR).
+pub(super) fn read_slices(name: &str, files: &dyn DataFiles, limits: &Limits) -> Result<Vec<Slice>, Box<Unread>> {
+    let unread = |series, fault| Box::new(Unread { name: name.to_owned(), series, fault });
+    let mut data_set = open_data_set(name, files, limits).map_err(|fault| unread(None, fault))?;
+    let (parsed, outcome) = data_set.parse();
+    let elements = parsed.elements;
+    if elements.has(tags::DIRECTORY_RECORDS) {
+        return Ok(Vec::new());
+    }
+    let slices = outcome
+        .and_then(|()| Image::new(name, &elements, parsed.pixels, data_set.codec))
+        .and_then(|image| slices_of(Rc::new(image), &elements));
+    slices.map_err(|fault| unread(Some(series(&elements)).filter(|uid| !uid.is_empty()), fault))
+}
+
+fn slices_of(image: Rc<Image>, elements: &DataSet) -> Result<Vec<Slice>, ReadError> {
     if mosaic::is_mosaic(elements) {
         return mosaic::tiles(image, elements);
     }

@@ -2,8 +2,8 @@
 
 use brickfield_core::{ScalarType, ValueRange};
 
-use super::colours::Palette;
 use super::elements::{DataSet, PixelElement, PixelParts};
+use super::palette::Palette;
 use super::source::Codec;
 use super::tags;
 use crate::ReadError;

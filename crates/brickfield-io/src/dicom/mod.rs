@@ -8,7 +8,7 @@
 //! | `source.rs`, `elements.rs`, `headers.rs`, `tags.rs`, `attributes.rs` | bytes to elements |
 //! | `image.rs`, `slice.rs`, `frames.rs`, `mosaic.rs` | elements to slices |
 //! | `series.rs`, `stack.rs` | slices to a stack |
-//! | `frame_bytes.rs`, `codecs/`, `colours.rs`, `pixels.rs` | frames to voxels |
+//! | `frame_bytes.rs`, `codecs/`, `colours.rs`, `palette.rs`, `pixels.rs` | frames to voxels |
 //!
 //! Slices are sorted by position along their normal and kept as they are: none is resampled. Gantry tilt becomes a
 //! sheared grid, which is exact. Uneven steps cannot be a grid; it gets the median step, and
@@ -23,6 +23,7 @@ mod frames;
 mod headers;
 mod image;
 mod mosaic;
+mod palette;
 mod pixels;
 mod series;
 mod slice;
@@ -36,7 +37,8 @@ use crate::colour::{ColourPart, Colours};
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
 use crate::{DataFiles, Format, Limits, Note, OpenOptions, Opened, ReadError, WorldFrame};
-use slice::{Slice, Unread, read_slices};
+use frames::{Unread, read_slices};
+use slice::Slice;
 
 /// Reads one series among the named files, the largest unless another is selected; the world is the patient's,
 /// left-posterior-superior.

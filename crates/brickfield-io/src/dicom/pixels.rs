@@ -13,7 +13,8 @@ use crate::colour::{ColourPart, Colours};
 use crate::files::DataFiles;
 use crate::guard::guarded;
 use crate::limits::{CheckedShape, Limits, check_bytes};
-use crate::samples::{allocate, append_binary, with_room};
+use crate::numbers::with_room;
+use crate::samples::{allocate, append_binary};
 use crate::{ByteOrder, Note, ReadError};
 
 /// The stored values of all slices, in the type of the shape; of colours the part that is wanted.

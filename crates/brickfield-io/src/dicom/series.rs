@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 
 use brickfield_core::glam::DVec3;
 
-use super::slice::{Slice, Unread};
+use super::frames::Unread;
+use super::slice::Slice;
 use crate::choice::Entries;
 use crate::opened::FileFacts;
 use crate::{ChoiceKind, Note, ReadError};

@@ -9,7 +9,7 @@ use brickfield_core::{Grid, ScalarType, Volume};
 
 #[cfg(feature = "gzip")]
 use crate::Compression;
-use crate::save::{save_atomically, values, write_samples};
+use crate::saved::{save_atomically, values, write_samples};
 use crate::{ByteOrder, SaveError, SaveOptions, WorldFrame};
 
 /// Saves a volume as attached MetaImage (`.mha`): whole or not at all, for the file is renamed into place.

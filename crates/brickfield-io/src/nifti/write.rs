@@ -6,7 +6,7 @@ use std::path::Path;
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Rescale, ScalarType, Volume};
 
-use crate::save::{save_atomically, write_samples};
+use crate::saved::{save_atomically, write_samples};
 use crate::{ByteOrder, SaveError, SaveOptions, WorldFrame};
 
 /// Saves a volume as NIfTI (`.nii`, `.nii.gz`): whole or not at all, for the file is renamed into place.

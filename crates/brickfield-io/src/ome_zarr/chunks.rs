@@ -8,7 +8,8 @@ use super::axes::VolumeAxes;
 use super::metadata::ArrayMetadata;
 use crate::error::bytes;
 use crate::limits::CheckedShape;
-use crate::samples::{FileScalar, with_room};
+use crate::numbers::FileScalar;
+use crate::numbers::with_room;
 use crate::stored_type::StoredType;
 use crate::{ByteOrder, Note, ReadError};
 

@@ -11,7 +11,7 @@ use zarrs::array::{Array, ArraySubset, CodecOptions};
 use zarrs::filesystem::FilesystemStore;
 use zarrs::storage::ReadableWritableListableStorage;
 
-use crate::save::{UNFINISHED, folder_of, values};
+use crate::saved::{UNFINISHED, folder_of, values};
 use crate::{Compression, Format, SaveError, SaveOptions};
 
 /// Samples along a chunk's side.

@@ -3,27 +3,18 @@
 //! Slices are in natural order of their names: 2 comes before 10. All are of one size and type. Their spacing is 1, for
 //! pictures state none along the stack.
 
-mod bits;
 mod order;
-mod pixel;
 #[cfg(feature = "png")]
 mod png;
 
 use brickfield_core::Voxels;
 use brickfield_core::glam::DVec3;
 
-#[cfg(feature = "tiff")]
-pub(crate) use bits::packed_row_bytes;
-#[cfg(feature = "tiff")]
-pub(crate) use bits::widen_bits;
-#[cfg(feature = "tiff")]
-pub(crate) use pixel::{KeptSamples, Pixel};
-pub(crate) use pixel::{PictureShape, PixelPart};
-
 use crate::files::{DataFiles, open_named, read_head};
 use crate::guard::guarded;
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
+use crate::pixel::{PictureShape, PixelPart};
 use crate::placement::GridPlacement;
 use crate::samples::allocate;
 #[cfg(feature = "tiff")]

@@ -3,12 +3,12 @@
 use brickfield_core::{ScalarType, Voxels};
 use png::{BitDepth, ColorType, Decoder, Reader, Transformations};
 
-use super::bits::widen_bits;
-use super::pixel::{KeptSamples, PictureShape, Pixel, PixelPart, keep_samples};
 use crate::colour::Colours;
 use crate::files::ByteSource;
 use crate::limits::{Limits, check_bytes};
-use crate::samples::with_room;
+use crate::numbers::with_room;
+use crate::packed_bits::widen_bits;
+use crate::pixel::{KeptSamples, PictureShape, Pixel, PixelPart, keep_samples};
 use crate::{ByteOrder, ReadError};
 
 /// A PNG file whose header has been read.

@@ -7,8 +7,8 @@ use super::page::Page;
 use super::predict::{RowShape, undo};
 use super::unpack::{JpegShape, PageCompression, unpack};
 use crate::limits::{Limits, check_bytes};
-use crate::pictures::{packed_row_bytes, widen_bits};
-use crate::samples::with_room;
+use crate::numbers::with_room;
+use crate::packed_bits::{packed_row_bytes, widen_bits};
 use crate::{ByteOrder, ReadError};
 
 mod tag {

@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind, SeekFrom};
 
 use crate::files::{ByteSource, n_bytes_left, read_head};
 use crate::format::is_tiff;
-use crate::samples::with_room;
+use crate::numbers::with_room;
 use crate::{ByteOrder, Format, ReadError};
 
 /// A TIFF file after its header.

@@ -25,7 +25,7 @@ use crate::files::{ByteSource, DataFiles};
 use crate::guard::guarded;
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
-use crate::pictures::{KeptSamples, PictureShape, PixelPart};
+use crate::pixel::{KeptSamples, PictureShape, PixelPart};
 use crate::placement::GridPlacement;
 use crate::samples::{allocate, append_zeros};
 use crate::{ChoiceKind, Format, Limits, Note, OpenOptions, Opened, ReadError};

@@ -8,7 +8,7 @@ use super::unpack::PageCompression;
 use crate::ReadError;
 use crate::colour::Colours;
 use crate::limits::{Limits, check_bytes};
-use crate::pictures::{PictureShape, Pixel};
+use crate::pixel::{PictureShape, Pixel};
 use crate::stored_type::StoredType;
 
 mod tag {

@@ -7,7 +7,7 @@ use super::files::OneFile;
 use super::page::Page;
 use super::stack::{Described, description};
 use crate::files::ByteSource;
-use crate::pictures::{KeptSamples, PictureShape, Pixel, PixelPart};
+use crate::pixel::{KeptSamples, PictureShape, Pixel, PixelPart};
 use crate::{Limits, Note, ReadError};
 
 /// A file of one page.

@@ -13,7 +13,7 @@ use crate::format::is_tiff;
 use crate::length_unit::common_unit;
 use crate::lines::MAX_HEADER_BYTES;
 use crate::opened::FileFacts;
-use crate::pictures::Pixel;
+use crate::pixel::Pixel;
 use crate::placement::AXES;
 use crate::{ChoiceKind, Note, ReadError};
 

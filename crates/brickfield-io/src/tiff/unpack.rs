@@ -6,7 +6,7 @@ use jpeg_decoder::{ColorTransform, Decoder, PixelFormat};
 
 use crate::ReadError;
 use crate::error::{Damage, one_line};
-use crate::samples::with_room;
+use crate::numbers::with_room;
 
 /// How strips and tiles are compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,8 +5,7 @@ use quick_xml::events::BytesStart;
 
 use super::attributes::{attribute, integer, several};
 use super::compressor::Compressor;
-use super::elements::{ends_within_document, read_document};
-use crate::files::ByteSource;
+use super::metered::ends_within_document;
 use crate::stored_type::StoredType;
 use crate::vtk_arrays::{ImageGeometry, Support, VtkArray, VtkSample};
 use crate::{ByteOrder, ReadError};
@@ -66,15 +65,6 @@ pub(super) struct Document {
 }
 
 impl Document {
-    /// Reads the document up to its end or to appended data.
-    pub(super) fn read(source: &mut dyn ByteSource) -> Result<Document, ReadError> {
-        let document = read_document(source)?;
-        match document.pieces.is_empty() {
-            false => Ok(document),
-            true => Err(document.missing("the element Piece")),
-        }
-    }
-
     /// The error of a part that is not there, or would have been if the file went on.
     pub(super) fn missing(&self, field: &'static str) -> ReadError {
         match self.cut_off_at {

@@ -8,7 +8,7 @@ use quick_xml::events::{BytesStart, Event};
 
 use super::attributes::attribute;
 use super::document::{ArrayStorage, Document};
-use super::metered::{Metered, find_underscore, skip_text};
+use super::metered::{Metered, ends_within_document, find_underscore, skip_text};
 use crate::error::Shown;
 use crate::files::{ByteSource, n_bytes_left, read_head};
 use crate::lines::MAX_HEADER_BYTES;
@@ -36,7 +36,11 @@ pub(super) fn read_document(source: &mut dyn ByteSource) -> Result<Document, Rea
     let Some(document) = document else {
         return Err(no_root(outcome, &head));
     };
-    outcome.map(|()| document)
+    outcome?;
+    match document.pieces.is_empty() {
+        false => Ok(document),
+        true => Err(document.missing("the element Piece")),
+    }
 }
 
 /// Reads elements up to the end or to appended data into the document, which the first of them makes.
@@ -85,10 +89,6 @@ fn closes_root(event: &Event) -> bool {
         Event::Empty(e) => e.name().as_ref() == "VTKFile",
         _ => false,
     }
-}
-
-pub(super) fn ends_within_document(n_file_bytes: u64) -> ReadError {
-    ReadError::EndsWithin { part: "the XML document".to_owned(), n_file_bytes, end: None }
 }
 
 /// All syntax errors of `quick-xml` but one are that something is not closed when the file ends.

@@ -4,7 +4,6 @@ use std::io::{self, BufRead, Read};
 
 use quick_xml::Reader;
 
-use super::elements::ends_within_document;
 use crate::ReadError;
 use crate::files::ByteSource;
 use crate::lines::MAX_HEADER_BYTES;
@@ -66,4 +65,8 @@ pub(super) fn find_underscore(reader: &mut Reader<Metered>) -> Result<u64, ReadE
             Err(e) => return Err(ReadError::io("the document", e)),
         }
     }
+}
+
+pub(super) fn ends_within_document(n_file_bytes: u64) -> ReadError {
+    ReadError::EndsWithin { part: "the XML document".to_owned(), n_file_bytes, end: None }
 }

@@ -26,6 +26,7 @@ use crate::vtk_arrays::{Bits, VtkArray, VtkSample, choose, dims};
 use crate::{Format, OpenOptions, Opened, ReadError};
 use blocks::{WordReader, check_plain, read_blocks};
 use document::{Array, ArrayStorage, Document, Piece};
+use elements::read_document;
 use inline::{Base64Reader, UntilTag};
 use pieces::Assembly;
 
@@ -41,7 +42,7 @@ pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, options: &Ope
 }
 
 fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
-    let document = Document::read(source)?;
+    let document = read_document(source)?;
     let mut found = FileFacts::plain(Format::Vti, options);
     let arrays = document.arrays();
     let chosen = choose(&arrays, &mut found)?;
@@ -109,7 +110,7 @@ fn read_pieces(
 }
 
 fn read_piece_file(file: &mut dyn ByteSource, about: &VtkArray, assembly: &mut Assembly) -> Result<(), ReadError> {
-    let document = Document::read(file)?;
+    let document = read_document(file)?;
     match document.is_parallel {
         true => Err(ReadError::unsupported("VTKFile type", "PImageData", "ImageData is, of a piece")),
         false => put_pieces(file, &document, about, assembly),

@@ -4,7 +4,8 @@ use brickfield_core::Voxels;
 
 use crate::ReadError;
 use crate::limits::CheckedShape;
-use crate::samples::{allocate, append_zeros, with_room};
+use crate::numbers::with_room;
+use crate::samples::{allocate, append_zeros};
 use crate::vtk_arrays::{Support, dims};
 
 /// The part of an image that is there so far.

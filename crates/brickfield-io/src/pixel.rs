@@ -202,7 +202,7 @@ impl PixelPart {
 
 /// The samples of each pixel that are kept.
 #[cfg(feature = "png")]
-pub(super) fn keep_samples(mut bytes: Vec<u8>, n_samples: usize, sample_bytes: usize, kept: Range<usize>) -> Vec<u8> {
+pub(crate) fn keep_samples(mut bytes: Vec<u8>, n_samples: usize, sample_bytes: usize, kept: Range<usize>) -> Vec<u8> {
     let n_kept = keep_components(&mut bytes, n_samples, sample_bytes, kept);
     bytes.truncate(n_kept);
     bytes
