@@ -61,7 +61,7 @@ pub(crate) fn open_named<'a>(files: &'a dyn DataFiles, name: &str) -> Result<Box
 }
 
 /// Whether a path with slashes stays in the folder.
-#[cfg(any(feature = "ome-zarr", feature = "vti"))]
+#[cfg(any(feature = "tiff", feature = "ome-zarr", feature = "vti"))]
 pub(crate) fn stays_within(path: &str) -> bool {
     path.split('/').all(|part| !matches!(part, "" | "." | "..")) && !path.contains(['\\', ':', '\0'])
 }

@@ -48,9 +48,12 @@ fn read_raw(path: &Path, spec: &RawSpec, options: &OpenOptions) -> Result<Opened
 
 /// The name of the format that begins like this.
 fn known_start(head: &[u8], path: &Path) -> Option<&'static str> {
-    let inner = ungzipped(head);
-    let format = Format::from_magic(inner.as_deref().unwrap_or(head)).map(Format::name);
-    format.or_else(|| foreign(head, path).map(|foreign| foreign.name))
+    format_within(head).map(Format::name).or_else(|| foreign(head, path).map(|foreign| foreign.name))
+}
+
+/// The format that a file begins like, inside a gzip wrapper or not.
+fn format_within(head: &[u8]) -> Option<Format> {
+    Format::from_magic(ungzipped(head).as_deref().unwrap_or(head))
 }
 
 /// The format of a file or folder: by content where it has a magic, else by extension.
@@ -213,7 +216,7 @@ fn feature_off(format: Format) -> ReadError {
     ReadError::FeatureOff { format, feature }
 }
 
-#[cfg(any(feature = "dicom", feature = "tiff", feature = "png"))]
+#[cfg(any(feature = "dicom", feature = "nifti", feature = "tiff", feature = "png"))]
 fn file_name(path: &Path) -> String {
     path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }
@@ -221,7 +224,7 @@ fn file_name(path: &Path) -> String {
 /// The file's name without `.hdr`, `.img`, `.hdr.gz` or `.img.gz`.
 #[cfg(feature = "nifti")]
 fn stem(path: &Path) -> String {
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = file_name(path);
     let plain = name.strip_suffix(".gz").unwrap_or(&name);
     plain.rsplit_once('.').map_or(plain, |(stem, _)| stem).to_owned()
 }
@@ -230,10 +233,9 @@ fn stem(path: &Path) -> String {
 #[cfg(feature = "nifti")]
 fn is_image_of_pair(path: &Path) -> bool {
     let is_named = Format::from_extension(path) == Some(Format::Nifti);
-    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let name = file_name(path).to_ascii_lowercase();
     let head = || buffered(path).and_then(|mut file| read_head(&mut file, HEAD_BYTES)).unwrap_or_default();
-    let holds_header = |head: Vec<u8>| Format::from_magic(&ungzipped(&head).unwrap_or(head)) == Some(Format::Nifti);
-    is_named && name.trim_end_matches(".gz").ends_with(".img") && !holds_header(head())
+    is_named && name.trim_end_matches(".gz").ends_with(".img") && format_within(&head()) != Some(Format::Nifti)
 }
 
 /// Names of the regular files in a folder, in order.

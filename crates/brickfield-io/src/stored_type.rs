@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use brickfield_core::{Scalar, ScalarType, Voxels, with_voxels};
+use brickfield_core::{Scalar, ScalarType, ValueRange, Voxels, with_voxels};
 
 use crate::numbers::{ByteOrder, FileScalar, with_room};
 use crate::{Note, ReadError};
@@ -191,10 +191,11 @@ fn narrowed(voxels: Voxels) -> Result<Voxels, ReadError> {
         Ok(T::wrap(narrow))
     }
     with_voxels!(&voxels, values => {
-        let (low, high) = values.iter().fold((0f64, 0f64), |(low, high), v| {
-            (low.min(v.to_f64().round()), high.max(v.to_f64().round()))
+        let range = values.iter().fold(ValueRange { min: 0.0, max: 0.0 }, |range, v| {
+            let value = v.to_f64().round();
+            range.union(ValueRange { min: value, max: value })
         });
-        match narrowest_integer(low, high) {
+        match narrowest_integer(range) {
             Some(ScalarType::U8) => of::<u8>(values),
             Some(ScalarType::I8) => of::<i8>(values),
             Some(ScalarType::U16) => of::<u16>(values),
@@ -206,17 +207,24 @@ fn narrowed(voxels: Voxels) -> Result<Voxels, ReadError> {
     })
 }
 
-/// The narrowest integer type from the lowest to the highest value, unsigned first.
-pub(crate) fn narrowest_integer(low: f64, high: f64) -> Option<ScalarType> {
-    let bounds = [
-        (ScalarType::U8, 0.0, f64::from(u8::MAX)),
-        (ScalarType::I8, f64::from(i8::MIN), f64::from(i8::MAX)),
-        (ScalarType::U16, 0.0, f64::from(u16::MAX)),
-        (ScalarType::I16, f64::from(i16::MIN), f64::from(i16::MAX)),
-        (ScalarType::U32, 0.0, f64::from(u32::MAX)),
-        (ScalarType::I32, f64::from(i32::MIN), f64::from(i32::MAX)),
-    ];
-    bounds.into_iter().find(|(_, min, max)| *min <= low && high <= *max).map(|(scalar, ..)| scalar)
+/// The narrowest integer type that holds a range of values, unsigned first.
+pub(crate) fn narrowest_integer(range: ValueRange) -> Option<ScalarType> {
+    use ScalarType::{I8, I16, I32, U8, U16, U32};
+    [U8, I8, U16, I16, U32, I32].into_iter().find(|scalar| holds(*scalar, range))
+}
+
+/// Whether an integer type holds a range of values; floats hold every range.
+pub(crate) fn holds(scalar: ScalarType, range: ValueRange) -> bool {
+    let (min, max) = match scalar {
+        ScalarType::U8 => (0.0, f64::from(u8::MAX)),
+        ScalarType::I8 => (f64::from(i8::MIN), f64::from(i8::MAX)),
+        ScalarType::U16 => (0.0, f64::from(u16::MAX)),
+        ScalarType::I16 => (f64::from(i16::MIN), f64::from(i16::MAX)),
+        ScalarType::U32 => (0.0, f64::from(u32::MAX)),
+        ScalarType::I32 => (f64::from(i32::MIN), f64::from(i32::MAX)),
+        ScalarType::F32 | ScalarType::F64 => return true,
+    };
+    min <= range.min && range.max <= max
 }
 
 #[cfg(test)]

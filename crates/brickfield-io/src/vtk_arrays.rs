@@ -2,16 +2,18 @@
 
 use std::io::{self, Read};
 
-use brickfield_core::ScalarType;
 use brickfield_core::glam::{DMat3, DVec3};
+use brickfield_core::{ScalarType, Voxels};
 
 use crate::choice::Entries;
 use crate::colour::Colours;
+use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
 use crate::placement::{AXES, GridPlacement, usable_spacing};
+use crate::samples::append_binary;
 use crate::stored_type::StoredType;
 use crate::stored_voxel::StoredVoxel;
-use crate::{ChoiceKind, Note, ReadError};
+use crate::{ByteOrder, ChoiceKind, Note, ReadError};
 
 /// Whether values belong to the points of the grid or to its cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +35,22 @@ impl VtkSample {
         match self {
             VtkSample::Bit => StoredType::Bool,
             VtkSample::Bytes(stored) => stored,
+        }
+    }
+
+    /// Appends the part that is read of the shape's voxels; `what` names them in errors.
+    pub(crate) fn append(
+        self,
+        voxels: &mut Voxels,
+        reader: &mut dyn Read,
+        shape: &CheckedShape,
+        order: ByteOrder,
+        what: &str,
+    ) -> Result<(), ReadError> {
+        let (n, voxel) = (shape.n_voxels(), shape.voxel);
+        match self {
+            VtkSample::Bit => append_binary(voxels, &mut Bits::new(reader), n, voxel, order, what),
+            VtkSample::Bytes(_) => append_binary(voxels, reader, n, voxel, order, what),
         }
     }
 
@@ -164,14 +182,14 @@ pub(crate) fn dims(extent: &[i64; 6], support: Support) -> Result<[u64; 3], Read
 }
 
 /// Packed bits, the highest of a byte first, as bytes of 0 and 1.
-pub(crate) struct Bits<'a> {
+struct Bits<'a> {
     reader: &'a mut dyn Read,
     held: u8,
     n_held: u32,
 }
 
 impl<'a> Bits<'a> {
-    pub(crate) fn new(reader: &'a mut dyn Read) -> Bits<'a> {
+    fn new(reader: &'a mut dyn Read) -> Bits<'a> {
         Bits { reader, held: 0, n_held: 0 }
     }
 }

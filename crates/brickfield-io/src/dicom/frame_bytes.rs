@@ -11,6 +11,7 @@ use super::source::{Codec, DataSetSource, open_data_set};
 use crate::error::check_length;
 use crate::files::{ByteSource, DataFiles};
 use crate::limits::check_bytes;
+use crate::numbers::with_room;
 use crate::samples::fill;
 use crate::{Limits, ReadError};
 
@@ -111,13 +112,8 @@ impl OpenFile<'_> {
 
     /// Bytes that lie within the file, by the walk over its elements.
     fn bytes(&mut self, start: u64, n_bytes: u64) -> Result<Vec<u8>, ReadError> {
-        let mut bytes = crate::numbers::with_room(n_bytes as usize)?;
-        bytes.resize(n_bytes as usize, 0);
-        let source = &mut *self.data_set.source;
-        let fault = |e| ReadError::io("the pixel data", e);
-        source.seek(SeekFrom::Start(start)).map_err(fault)?;
-        let n_read = fill(source, &mut bytes).map_err(fault)?;
-        check_length(&self.image.name, n_read as u64, n_bytes.into())?;
+        let bytes = read_at(&mut *self.data_set.source, start, n_bytes, "the pixel data")?;
+        check_length(&self.image.name, bytes.len() as u64, n_bytes.into())?;
         Ok(bytes)
     }
 }
@@ -155,7 +151,7 @@ fn frame_starts(image: &Image, all: &[Extent], source: &mut dyn ByteSource) -> R
 /// The first item of encapsulated pixel data: offsets of the frames' items, counted from the first fragment's.
 fn basic_offsets(table: Extent, source: &mut dyn ByteSource) -> Result<Vec<u64>, ReadError> {
     debug_assert!(table.start >= ITEM_HEADER_BYTES);
-    let bytes = read_at(source, table.start, table.n_bytes)?;
+    let bytes = read_at(source, table.start, table.n_bytes, FRAGMENTS)?;
     Ok(bytes.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b).into()).collect())
 }
 
@@ -170,17 +166,21 @@ fn codestream_starts(
     };
     let mut starts = Vec::new();
     for (i, fragment) in fragments.iter().enumerate() {
-        if read_at(source, fragment.start, fragment.n_bytes.min(magic.len() as u64))? == magic {
+        if read_at(source, fragment.start, fragment.n_bytes.min(magic.len() as u64), FRAGMENTS)? == magic {
             starts.push(i);
         }
     }
     Ok(starts)
 }
 
-fn read_at(source: &mut dyn ByteSource, start: u64, n_bytes: u64) -> Result<Vec<u8>, ReadError> {
-    let fault = |e| ReadError::io("the fragments", e);
+const FRAGMENTS: &str = "the fragments";
+
+/// The bytes at a position, as far as the file goes; `what` names them in errors.
+fn read_at(source: &mut dyn ByteSource, start: u64, n_bytes: u64, what: &str) -> Result<Vec<u8>, ReadError> {
+    let fault = |e| ReadError::io(what, e);
     source.seek(SeekFrom::Start(start)).map_err(fault)?;
-    let mut bytes = vec![0; n_bytes as usize];
+    let mut bytes = with_room(n_bytes as usize)?;
+    bytes.resize(n_bytes as usize, 0);
     let n_read = fill(source, &mut bytes).map_err(fault)?;
     bytes.truncate(n_read);
     Ok(bytes)

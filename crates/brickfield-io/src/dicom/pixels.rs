@@ -15,6 +15,7 @@ use crate::guard::guarded;
 use crate::limits::{CheckedShape, Limits, check_bytes};
 use crate::numbers::with_room;
 use crate::samples::{allocate, append_binary};
+use crate::stored_type::{holds, narrowest_integer};
 use crate::{ByteOrder, Note, ReadError};
 
 /// The stored values of all slices, in the type of the shape; of colours the part that is wanted.
@@ -54,7 +55,7 @@ fn frame_voxels(
     let shape = CheckedShape::claim([n_samples as u64, 1, 1], image.scalar, limits)?;
     let mut samples = allocate(&shape)?;
     append_binary(&mut samples, &mut bytes.as_slice(), n_samples, image.scalar, ByteOrder::Little, &image.name)?;
-    keep_stored_bits(&mut samples, n_samples, image.bits);
+    keep_stored_bits(&mut samples, image.bits);
     match image.colour.is_grey() {
         true => Ok(samples),
         false => Ok(Colours::Rgb.reduce(interleaved_rgb(samples, image)?, part)),
@@ -92,18 +93,15 @@ pub(super) fn common_scalar(slices: &[Slice], notes: &mut Vec<Note>) -> ScalarTy
         false => {
             let none = ValueRange { min: f64::INFINITY, max: f64::NEG_INFINITY };
             let range = slices.iter().fold(none, |range, slice| range.union(slice.image.value_range()));
-            INTEGERS.into_iter().find(|t| fits(range, *t)).unwrap_or(ScalarType::F64)
+            narrowest_integer(range).unwrap_or(ScalarType::F64)
         }
     };
     notes.push(Note::Converted { from: "several types", to });
     to
 }
 
-const INTEGERS: [ScalarType; 6] =
-    [ScalarType::U8, ScalarType::I8, ScalarType::U16, ScalarType::I16, ScalarType::U32, ScalarType::I32];
-
-/// Moves the stored bits of the last `n` samples to the low end, and fills the others with the sign.
-fn keep_stored_bits(voxels: &mut Voxels, n: usize, bits: Bits) {
+/// Moves the stored bits of samples to the low end, and fills the others with the sign.
+fn keep_stored_bits(voxels: &mut Voxels, bits: Bits) {
     let left = bits.n_allocated - 1 - bits.high;
     let right = bits.n_allocated - bits.n_stored;
     // Samples of one bit have been unpacked.
@@ -111,10 +109,9 @@ fn keep_stored_bits(voxels: &mut Voxels, n: usize, bits: Bits) {
         return;
     }
     macro_rules! shift {
-        ($values:expr) => {{
-            let start = $values.len() - n;
-            $values[start..].iter_mut().for_each(|v| *v = (*v << left) >> right);
-        }};
+        ($values:expr) => {
+            $values.iter_mut().for_each(|v| *v = (*v << left) >> right)
+        };
     }
     match voxels {
         Voxels::U8(v) => shift!(v),
@@ -182,7 +179,7 @@ fn integral_type(stored: &Voxels, rescales: &[Rescale], n_per_slice: usize) -> S
     let range = with_voxels!(stored, v => rescaled_range(v, rescales, n_per_slice));
     let integers = [ScalarType::I16, ScalarType::U16, ScalarType::I32, ScalarType::U32];
     let mut candidates = std::iter::once(stored.scalar_type()).chain(integers);
-    candidates.find(|t| fits(range, *t)).unwrap_or(ScalarType::F64)
+    candidates.find(|scalar| holds(*scalar, range)).unwrap_or(ScalarType::F64)
 }
 
 fn rescaled_range<T: Scalar>(values: &[T], rescales: &[Rescale], n_per_slice: usize) -> ValueRange {
@@ -193,19 +190,6 @@ fn rescaled_range<T: Scalar>(values: &[T], rescales: &[Rescale], n_per_slice: us
         }
     }
     range
-}
-
-fn fits(range: ValueRange, scalar: ScalarType) -> bool {
-    let (min, max) = match scalar {
-        ScalarType::U8 => (0.0, f64::from(u8::MAX)),
-        ScalarType::I8 => (f64::from(i8::MIN), f64::from(i8::MAX)),
-        ScalarType::U16 => (0.0, f64::from(u16::MAX)),
-        ScalarType::I16 => (f64::from(i16::MIN), f64::from(i16::MAX)),
-        ScalarType::U32 => (0.0, f64::from(u32::MAX)),
-        ScalarType::I32 => (f64::from(i32::MIN), f64::from(i32::MAX)),
-        ScalarType::F32 | ScalarType::F64 => return true,
-    };
-    min <= range.min && range.max <= max
 }
 
 fn apply<T: Scalar>(stored: &Voxels, rescales: &[Rescale], n_per_slice: usize) -> Result<Voxels, ReadError> {

@@ -3,7 +3,7 @@
 use super::directory::{PageStart, TiffFile, page_name};
 use super::page::Page;
 use crate::ReadError;
-use crate::files::{ByteSource, DataFiles, open_named};
+use crate::files::{ByteSource, DataFiles, open_named, stays_within};
 
 /// The tag of the pages inside a page: its reduced copies in a pyramid.
 pub(super) const SUB_IFDS: u16 = 330;
@@ -104,6 +104,6 @@ impl<'a> StackFiles<'a> {
 
 /// A name without a path.
 pub(super) fn check_name(name: &str) -> Result<(), ReadError> {
-    let is_plain = !matches!(name, "" | "." | "..") && !name.contains(['/', '\\', ':', '\0']);
+    let is_plain = stays_within(name) && !name.contains('/');
     if is_plain { Ok(()) } else { Err(ReadError::field("FileName", name, "the name of a file in the same folder")) }
 }

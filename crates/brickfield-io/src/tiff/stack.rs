@@ -208,11 +208,10 @@ impl OmePlanes {
     }
 }
 
-/// The choice of one of several; no note of a single one.
+/// The choice of one of several. A single one without a name leaves the wish to others: the samples of a pixel are channels, too.
 fn choose(found: &mut FileFacts, kind: ChoiceKind, entries: Entries) -> Result<u64, ReadError> {
     match entries {
         Entries::Numbered(1) => Ok(0),
-        Entries::Named(names) if names.len() == 1 => Ok(found.choices.choose(kind, Entries::Named(names), 0)?.entry),
         entries => found.choose(kind, entries),
     }
 }

@@ -21,8 +21,8 @@ use crate::files::{ByteSource, DataFiles, n_bytes_left, open_named, stays_within
 use crate::guard::guarded;
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
-use crate::samples::{allocate, append_binary, append_text, least_text_bytes};
-use crate::vtk_arrays::{Bits, VtkArray, VtkSample, choose, dims};
+use crate::samples::{allocate, append_text, least_text_bytes};
+use crate::vtk_arrays::{VtkArray, VtkSample, choose, dims};
 use crate::{Format, OpenOptions, Opened, ReadError};
 use blocks::{WordReader, check_plain, read_blocks};
 use document::{Array, ArrayStorage, Document, Piece};
@@ -199,10 +199,6 @@ fn read_binary(
         }
     };
     let mut voxels = allocate(shape)?;
-    let (n, voxel, order) = (shape.n_voxels(), shape.voxel, document.order);
-    match sample {
-        VtkSample::Bit => append_binary(&mut voxels, &mut Bits::new(bytes), n, voxel, order, what)?,
-        VtkSample::Bytes(_) => append_binary(&mut voxels, bytes, n, voxel, order, what)?,
-    }
+    sample.append(&mut voxels, bytes, shape, document.order, what)?;
     Ok(voxels)
 }

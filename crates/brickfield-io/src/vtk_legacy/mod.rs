@@ -14,8 +14,8 @@ use crate::error::check_length;
 use crate::files::{ByteSource, n_bytes_left};
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
-use crate::samples::{allocate, append_binary, append_text, least_text_bytes};
-use crate::vtk_arrays::{Bits, VtkSample, choose, dims};
+use crate::samples::{allocate, append_text, least_text_bytes};
+use crate::vtk_arrays::{choose, dims};
 use crate::{ByteOrder, Format, OpenOptions, Opened, ReadError};
 use sections::{Sections, StoredArray};
 use shares::Shares;
@@ -69,18 +69,11 @@ fn read_array(
     };
     check_length(&what, n_left, expected_bytes)?;
     let mut voxels = allocate(shape)?;
-    let (n, voxel, order) = (shape.n_voxels(), shape.voxel, ByteOrder::Big);
-    match (is_binary, sample) {
-        (false, _) if array.are_shares => append_text(&mut voxels, &mut Shares::new(source), n, voxel, &what)?,
-        (false, _) => append_text(&mut voxels, source, n, voxel, &what)?,
-        (true, VtkSample::Bit) => {
-            let mut source = source;
-            append_binary(&mut voxels, &mut Bits::new(&mut source), n, voxel, order, &what)?;
-        }
-        (true, VtkSample::Bytes(_)) => {
-            let mut source = source;
-            append_binary(&mut voxels, &mut source, n, voxel, order, &what)?;
-        }
+    let (n, voxel) = (shape.n_voxels(), shape.voxel);
+    match is_binary {
+        true => sample.append(&mut voxels, &mut &mut *source, shape, ByteOrder::Big, &what)?,
+        false if array.are_shares => append_text(&mut voxels, &mut Shares::new(source), n, voxel, &what)?,
+        false => append_text(&mut voxels, source, n, voxel, &what)?,
     }
     Ok(voxels)
 }
