@@ -43,6 +43,8 @@ mod placement;
 pub mod raw;
 #[cfg(any(feature = "nifti", feature = "dicom"))]
 mod rescale;
+#[cfg(any(feature = "dicom", feature = "tiff"))]
+mod runs;
 mod samples;
 mod save;
 mod saved;

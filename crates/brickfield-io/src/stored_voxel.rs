@@ -18,7 +18,7 @@ pub(crate) struct StoredVoxel {
     pub(crate) part: ColourPart,
 }
 
-/// The most numbers of a voxel: those of one voxel fit into a piece that is read at once.
+/// The most numbers of a voxel: a piece that is read at once holds a whole voxel.
 pub(crate) const MAX_COMPONENTS: u64 = 32_768;
 
 impl StoredVoxel {

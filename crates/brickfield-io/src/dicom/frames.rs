@@ -71,7 +71,7 @@ fn place_evenly(slices: &mut [Slice], elements: &DataSet) {
     }
 }
 
-/// The frames' distances from the first one, along the normal; and the element that states them, if it is one of a step.
+/// The distance of each frame from the first, along the normal; and the element that states the step, if a step is stated.
 fn offsets(first: &Slice, n_frames: usize, normal: DVec3, elements: &DataSet) -> Option<(Vec<f64>, Option<StepFrom>)> {
     let stated = elements.all_numbers(tags::GRID_FRAME_OFFSETS);
     if stated.len() == n_frames && stated.iter().all(|offset| offset.is_finite()) {

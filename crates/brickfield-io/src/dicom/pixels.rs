@@ -130,8 +130,8 @@ pub(super) struct Rescaled {
     pub(super) rescale: Rescale,
 }
 
-/// The values that the modality means. A rescale that all slices share and that is not integral is the volume's: voxels stay as
-/// they are stored. Else the values are computed, slice by slice.
+/// Values in the modality's unit. If all slices share a rescale that is not integral, it becomes the volume's rescale and voxels
+/// stay as they are stored. Otherwise the values are computed, slice by slice.
 pub(super) fn rescaled_slices(
     stored: Voxels,
     slices: &[Slice],

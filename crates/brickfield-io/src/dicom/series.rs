@@ -11,7 +11,7 @@ use crate::choice::Entries;
 use crate::opened::FileFacts;
 use crate::{ChoiceKind, Note, ReadError};
 
-/// The slices of one series that have one size and orientation: of several sets the wanted one, else the largest.
+/// The slices of a series with equal size and orientation. If there are several such sets: the wanted set, else the largest.
 pub(super) fn chosen_series(slices: Vec<Slice>, found: &mut FileFacts) -> Result<Vec<Slice>, ReadError> {
     let mut kinds: BTreeMap<_, Vec<Slice>> = BTreeMap::new();
     for slice in slices {

@@ -1,4 +1,4 @@
-//! From the slices of a series to a stack: which of those at one position, in which order, and where they lie.
+//! From the slices of a series to a stack: one slice for each position, their order and their place.
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -113,7 +113,7 @@ fn one_segment(slices: Vec<Slice>, found: &mut FileFacts) -> Result<Vec<Slice>, 
     }
 }
 
-/// Where several slices lie at one position, those of one time.
+/// The slices of one time, where positions have several slices.
 fn one_phase(mut slices: Vec<Slice>, order: Order, found: &mut FileFacts) -> Result<Vec<Slice>, ReadError> {
     order.sort(&mut slices);
     if order.are_all_apart(&slices) {
@@ -125,7 +125,7 @@ fn one_phase(mut slices: Vec<Slice>, order: Order, found: &mut FileFacts) -> Res
     Ok(groups.swap_remove(chosen as usize))
 }
 
-/// Groups by the stated numbers along dimensions that are none of space, if that leaves one slice for each position.
+/// Groups by the numbers along dimensions other than space, if each group then has one slice for each position.
 fn by_stated_phase(slices: &[Slice], order: Order) -> Option<Vec<Vec<Slice>>> {
     let mut groups: BTreeMap<&[i64], Vec<Slice>> = BTreeMap::new();
     for slice in slices {

@@ -11,7 +11,7 @@ use crate::stored_type::StoredType;
 use crate::stored_voxel::StoredVoxel;
 use crate::{ChoiceKind, ReadError};
 
-/// What is read of each voxel; and how many voxels of the volumes come before those of the one that is read.
+/// The numbers that are read of each voxel, and the voxels of earlier volumes, which are skipped.
 pub(super) struct Part {
     pub(super) voxel: StoredVoxel,
     pub(super) n_before: u128,

@@ -1,6 +1,6 @@
 //! TIFF and BigTIFF stacks: each page a slice, or several where it has a depth.
 //!
-//! Which page is which slice, and the spacing, come from the description that ImageJ or OME-TIFF write; without one the
+//! The description that ImageJ or OME-TIFF write says which page is which slice, and the spacing. Without a description the
 //! pages are in order and the spacing is 1, for the resolution tags of other writers are about paper. Strips and tiles
 //! are decoded here, with decompressors from crates. Not: fax, JPEG 2000.
 

@@ -26,7 +26,7 @@ mod tag {
     pub(super) const META_MORPH_PLANES: u16 = 33629;
 }
 
-/// The slices of one channel of one image at one time.
+/// The slices of a volume: an image, a channel and a time have been chosen.
 pub(super) struct Stack {
     /// Slices, those of a page with depth being one.
     pub(super) n_planes: u64,

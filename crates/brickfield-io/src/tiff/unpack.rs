@@ -7,6 +7,7 @@ use jpeg_decoder::{ColorTransform, Decoder, PixelFormat};
 use crate::ReadError;
 use crate::error::{Damage, one_line};
 use crate::numbers::with_room;
+use crate::runs::unpack_runs;
 
 /// How strips and tiles are compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -135,26 +136,10 @@ impl Unpacked {
         damage
     }
 
-    /// Runs of literal and of repeated bytes (TIFF 6.0, section 9).
     fn pack_bits(&mut self, packed: &[u8]) -> Damage {
-        let mut rest = packed;
-        while self.bytes.len() < self.expected {
-            let Some((head, tail)) = rest.split_first() else { break };
-            let n_left = self.expected - self.bytes.len();
-            match *head as i8 {
-                -128 => rest = tail,
-                n @ 0.. => {
-                    let (run, tail) = tail.split_at(tail.len().min(n as usize + 1));
-                    self.bytes.extend_from_slice(&run[..run.len().min(n_left)]);
-                    rest = tail;
-                }
-                n => {
-                    let Some((value, tail)) = tail.split_first() else { break };
-                    self.bytes.extend(std::iter::repeat_n(*value, n_left.min(1 + n.unsigned_abs() as usize)));
-                    rest = tail;
-                }
-            }
-        }
+        self.bytes.resize(self.expected, 0);
+        let n_left = unpack_runs(packed, &mut self.bytes.iter_mut());
+        self.bytes.truncate(self.expected - n_left);
         Damage::CutOff
     }
 

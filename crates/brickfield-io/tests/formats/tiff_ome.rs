@@ -222,7 +222,7 @@ fn xml_that_is_malformed_is_refused_on_one_line() {
     assert_eq!(refused, "number of planes is \"4000000000\"; expected at most 16777216");
 }
 
-/// Files for fuzzing: one with most of what there is, one whose planes lie in several, and one whose document is apart.
+/// Files for fuzzing: a file with most features, planes in several files, and a document in a file of its own.
 pub(crate) fn examples() -> [BTreeMap<String, Vec<u8>>; 3] {
     let inside = "<Channel Name=\"DAPI\"/><Channel Name=\"GFP\"/><TiffData FirstC=\"1\" IFD=\"0\" PlaneCount=\"2\"/><TiffData IFD=\"2\"/>";
     let sizes = "SizeC=\"2\" SizeZ=\"2\" PhysicalSizeX=\"0.5\" PhysicalSizeXUnit=\"nm\" PhysicalSizeZ=\"3\"";

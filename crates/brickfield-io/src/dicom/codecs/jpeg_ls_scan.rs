@@ -99,7 +99,7 @@ pub(super) fn decode_scan(
     Some((planes, state.bits.at))
 }
 
-/// The line that is decoded and the one before, with one sample more at each end.
+/// The current line and the previous line, each with an extra sample at both ends.
 #[derive(Clone)]
 struct Lines {
     previous: Vec<i32>,

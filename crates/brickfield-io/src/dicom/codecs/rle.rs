@@ -3,6 +3,7 @@
 use super::FrameShape;
 use crate::ReadError;
 use crate::error::check_length;
+use crate::runs::unpack_runs;
 
 const HEADER_BYTES: usize = 64;
 const MAX_SEGMENTS: usize = 15;
@@ -22,7 +23,7 @@ pub(super) fn decode(packed: &[u8], shape: &FrameShape) -> Result<Vec<u8>, ReadE
         let (channel, byte) = (i / shape.word_bytes(), i % shape.word_bytes());
         let first = channel * shape.word_bytes() + shape.word_bytes() - 1 - byte;
         let mut places = out.iter_mut().skip(first).step_by(expected);
-        let n_missing = unpack(segment, &mut places);
+        let n_missing = unpack_runs(segment, &mut places);
         if n_missing > 0 {
             let n_pixels = (shape.columns * shape.rows) as u64;
             let what = format!("segment {} of an RLE frame", i + 1);
@@ -30,28 +31,4 @@ pub(super) fn decode(packed: &[u8], shape: &FrameShape) -> Result<Vec<u8>, ReadE
         }
     }
     Ok(out)
-}
-
-/// Writes the bytes of a segment to their places; how many places are left.
-fn unpack<'a>(mut segment: &[u8], places: &mut (impl ExactSizeIterator<Item = &'a mut u8> + 'a)) -> usize {
-    while let [head, rest @ ..] = segment {
-        let n = usize::from(*head);
-        segment = match *head {
-            0..=127 => {
-                let literal = &rest[..rest.len().min(n + 1)];
-                literal.iter().zip(places.by_ref()).for_each(|(byte, place)| *place = *byte);
-                rest.get(n + 1..).unwrap_or_default()
-            }
-            128 => rest,
-            129..=255 => {
-                let [byte, rest @ ..] = rest else { break };
-                places.by_ref().take(257 - n).for_each(|place| *place = *byte);
-                rest
-            }
-        };
-        if places.len() == 0 {
-            break;
-        }
-    }
-    places.len()
 }
