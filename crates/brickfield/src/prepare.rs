@@ -276,8 +276,9 @@ fn segment_reach(tree: &BrickTree, scene: &Scene) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{BackendKind, Validation, open_backend};
     use brickfield_bricks::{BuildOptions, build_tree};
-    use brickfield_core::{BrickSide, Camera, Grid, Knot, Projection, TransferFunction, Volume};
+    use brickfield_core::{BrickSide, Camera, Grid, Knot, Projection, Rescale, TransferFunction, Volume};
     use brickfield_lod::{Answer, Tile, select_by};
 
     #[test]
@@ -294,6 +295,28 @@ mod tests {
         for unit in [1e300, -1e300, 1e-305, 1e-310] {
             assert!(matches!(plan(unit), Err(PrepareError::Values { .. })), "{unit}");
         }
+    }
+
+    #[test]
+    fn stored_voxels_are_drawn_as_their_values() {
+        let grid = Grid::axis_aligned(UVec3::splat(20), DVec3::ONE).unwrap();
+        let rescale = Rescale::new(-0.25, 40.0).unwrap();
+        let stored: Vec<u8> = (0..8000u32).map(|i| (i % 20 * 12) as u8).collect();
+        let values: Vec<f32> = stored.iter().map(|v| rescale.value(f64::from(*v)) as f32).collect();
+        let picture = |volume: Volume| {
+            let tree = build_tree(&volume, &BuildOptions::default()).unwrap();
+            let camera = Camera::framing(&grid.world_box(), DVec3::new(1.0, 2.0, 3.0), DVec3::Z).unwrap();
+            let knot = |value: f64, extinction: f64| Knot { value, extinction, color: [0.2, 0.5, 1.0] };
+            let transfer = TransferFunction::new(vec![knot(-10.0, 0.0), knot(10.0, 0.2), knot(40.0, 0.05)]).unwrap();
+            let scene = Scene::new(camera, UVec2::new(24, 24), transfer);
+            let plan = prepare(&tree, &scene, &mut Residency::default()).unwrap();
+            let mut backend = open_backend(BackendKind::Cpu, None, Validation::Off).unwrap();
+            backend.render(&plan).unwrap().image
+        };
+        let of_stored = picture(Volume::rescaled(grid, stored, rescale).unwrap());
+        let of_values = picture(Volume::new(grid, values).unwrap());
+        let pairs = of_stored.pixels().iter().flatten().zip(of_values.pixels().iter().flatten());
+        assert!(pairs.clone().all(|(a, b)| (a - b).abs() < 1e-5) && pairs.map(|(a, _)| *a).sum::<f32>() > 10.0);
     }
 
     #[test]

@@ -331,6 +331,15 @@ mod tests {
     use brickfield_core::{Axes, Level};
 
     #[test]
+    fn a_rescale_follows_the_decoding() {
+        let rescale = Rescale::new(-0.5, 10.0).unwrap();
+        let (_, decode) = SampleFormat::encoding(ScalarType::I16, ValueRange { min: 0.0, max: 1.0 });
+        for read in [0.0, 0.25, 1.0] {
+            assert_eq!(decode.rescaled(rescale).value(read), rescale.value(decode.value(read)));
+        }
+    }
+
+    #[test]
     fn encodings_keep_integers_and_centre_wide_types() {
         let range = ValueRange { min: 1e9, max: 1e9 + 4.0 };
         let (format, decode) = SampleFormat::encoding(ScalarType::I32, range);
