@@ -103,6 +103,14 @@ fn scale_and_translation_place_the_first_sample() {
     assert_eq!(opened.volume.grid().spacing(), DVec3::new(2.0, 3.0, 4.0));
     assert_near(centre(&opened, 1.0, 1.0, 1.0), [12.0, 23.0, 34.0]);
     assert_eq!(opened.unit.as_deref(), Some("micrometer"));
+    // Transformations of the whole image follow those of its levels: a scale applies to their translation, too.
+    let mut scaled = v2("|u1", "null", vec![0; 24]);
+    let attributes = String::from_utf8(scaled[".zattrs"].clone()).unwrap();
+    let of_image = r#""version":"0.4","coordinateTransformations":[{"type":"scale","scale":[1,1,10]}]"#;
+    scaled.insert(".zattrs".to_owned(), attributes.replace(r#""version":"0.4""#, of_image).into_bytes());
+    let opened = read(&scaled).unwrap();
+    assert_eq!(opened.volume.grid().spacing(), DVec3::new(20.0, 3.0, 4.0));
+    assert_near(centre(&opened, 1.0, 1.0, 1.0), [120.0, 23.0, 34.0]);
 }
 
 #[test]
