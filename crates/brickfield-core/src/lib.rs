@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod block;
 mod brick;
 mod camera;
 mod grid;
@@ -13,6 +14,7 @@ mod space;
 mod transfer;
 mod volume;
 
+pub use block::{BlockLayout, BlockSide, BlockSideError, BlockSummary, Interblock, N_BLOCK_BINS};
 pub use brick::{BrickId, Cut, CutError, Level};
 pub use camera::{Camera, CameraError, PixelRays, Projection};
 pub use glam;
