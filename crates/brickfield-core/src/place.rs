@@ -15,6 +15,8 @@ use crate::Level;
 /// |   +-----+ |      A sample that was picked lies at 2^l i: first = 2^l * (number of the slot's first sample).
 /// +-----------+      An average lies in the middle of the samples it averages: first = 2^l i + (2^l - 1) / 2.
 /// ```
+///
+/// The last sample may lie nearer to the last but one, where it averages less: at the upper ends of a volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     /// The first texel, along the texture's axes.
@@ -25,6 +27,8 @@ pub struct Place {
     pub level: Level,
     /// Where the first sample lies, in sample space.
     pub first: DVec3,
+    /// Where the last sample lies.
+    pub last: DVec3,
     /// Which axis of space each axis of the texture runs along.
     pub axes: Axes,
 }
@@ -77,10 +81,28 @@ impl Axes {
 }
 
 impl Place {
+    /// A place of samples that are all 2^level apart, whose texture runs along the axes of space.
+    pub fn even(texel: UVec3, n: UVec3, level: Level, first: DVec3) -> Place {
+        let last = first + (n.as_dvec3() - 1.0) * f64::from(level.stride());
+        Place { texel, n, level, first, last, axes: Axes::Xyz }
+    }
+
     /// A sample position in units of the slot's own samples, along the axes of space.
     #[inline]
     pub fn local(&self, sample_position: DVec3) -> DVec3 {
-        (sample_position - self.first) / f64::from(self.level.stride())
+        let stride = f64::from(self.level.stride());
+        let local = (sample_position - self.first) / stride;
+        let before_last = self.n_in_space().as_dvec3() - 2.0;
+        // The last two are not farther apart than others.
+        let last_gap = self.last - (self.first + before_last * stride);
+        let past = (local - before_last) * stride / last_gap;
+        DVec3::select(local.cmpgt(before_last) & last_gap.cmplt(DVec3::splat(stride)), before_last + past, local)
+    }
+
+    /// Whether all samples are 2^level apart.
+    pub fn is_even(&self) -> bool {
+        self.last
+            == Place { axes: self.axes, ..Place::even(self.texel, self.n_in_space(), self.level, self.first) }.last
     }
 
     /// Samples along the axes of space.
@@ -111,13 +133,17 @@ mod tests {
 
     #[test]
     fn an_average_lies_in_the_middle_of_its_samples() {
-        let place = Place {
-            texel: UVec3::ZERO,
-            n: UVec3::splat(8),
-            level: Level(2),
-            first: DVec3::splat(1.5),
-            axes: Axes::Xyz,
-        };
-        assert_eq!(place.local(DVec3::splat(5.5)), DVec3::ONE);
+        let place = Place::even(UVec3::ZERO, UVec3::splat(8), Level(2), DVec3::splat(1.5));
+        assert_eq!((place.local(DVec3::splat(5.5)), place.is_even()), (DVec3::ONE, true));
+    }
+
+    #[test]
+    fn the_last_sample_may_be_nearer() {
+        // 10 samples in threes of four, the last of two.
+        let place =
+            Place { last: DVec3::splat(8.5), ..Place::even(UVec3::ZERO, UVec3::splat(3), Level(2), DVec3::splat(1.5)) };
+        let at = [(1.5, 0.0), (5.5, 1.0), (7.0, 1.5), (8.5, 2.0)];
+        assert!(at.into_iter().all(|(q, s)| (place.local(DVec3::splat(q)) - s).abs().max_element() < 1e-15));
+        assert!(!place.is_even());
     }
 }

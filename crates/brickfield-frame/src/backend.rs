@@ -154,11 +154,16 @@ pub enum ShaderFunction {
     RayAnchor,
     /// x, y: pixel. Returns the direction in voxels per world unit, w: 0.
     RayDirection,
+    /// x, y, z: sample position. Returns the weights of flat blocks 0 to 3 of the eight around it ([`Join::Blend`](crate::Join));
+    /// 0 of other fields.
+    WeightsLow,
+    /// The same for blocks 4 to 7.
+    WeightsHigh,
 }
 
 impl ShaderFunction {
     /// All functions.
-    pub const ALL: [ShaderFunction; 7] = [
+    pub const ALL: [ShaderFunction; 9] = [
         ShaderFunction::Alpha,
         ShaderFunction::Depth,
         ShaderFunction::Classify,
@@ -166,6 +171,8 @@ impl ShaderFunction {
         ShaderFunction::Sample,
         ShaderFunction::RayAnchor,
         ShaderFunction::RayDirection,
+        ShaderFunction::WeightsLow,
+        ShaderFunction::WeightsHigh,
     ];
 
     /// The function's name in shaders and reports.
@@ -178,6 +185,8 @@ impl ShaderFunction {
             ShaderFunction::Sample => "sample",
             ShaderFunction::RayAnchor => "ray_anchor",
             ShaderFunction::RayDirection => "ray_direction",
+            ShaderFunction::WeightsLow => "weights_low",
+            ShaderFunction::WeightsHigh => "weights_high",
         }
     }
 }

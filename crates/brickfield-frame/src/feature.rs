@@ -16,19 +16,22 @@ pub enum Feature {
     SkipBesideBeams,
     /// Some slots are coarser than level 0.
     MultiLevel,
+    /// Some flat blocks end with a sample that averages fewer voxels than others.
+    ShortBlocks,
     /// The transfer function has several knots, and needs a lookup.
     TransferLookup,
 }
 
 impl Feature {
     /// All features.
-    pub const ALL: [Feature; 7] = [
+    pub const ALL: [Feature; 8] = [
         Feature::HardwareFilter,
         Feature::EarlyTermination,
         Feature::SkipEmpty,
         Feature::SkipMacrocells,
         Feature::SkipBesideBeams,
         Feature::MultiLevel,
+        Feature::ShortBlocks,
         Feature::TransferLookup,
     ];
 
@@ -41,6 +44,7 @@ impl Feature {
             Feature::SkipMacrocells => "skip_macrocells",
             Feature::SkipBesideBeams => "skip_beside_beams",
             Feature::MultiLevel => "multi_level",
+            Feature::ShortBlocks => "short_blocks",
             Feature::TransferLookup => "transfer_lookup",
         }
     }

@@ -145,6 +145,7 @@ impl FramePlan {
             (Feature::SkipMacrocells, self.occupancy.is_some()),
             (Feature::SkipBesideBeams, self.beams.is_some()),
             (Feature::MultiLevel, self.field.has_coarse()),
+            (Feature::ShortBlocks, self.field.has_short_blocks()),
             (Feature::TransferLookup, self.transfer.knots().len() > 1),
         ];
         needed.into_iter().filter_map(|(feature, is_needed)| is_needed.then_some(feature)).collect()

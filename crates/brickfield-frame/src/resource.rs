@@ -21,6 +21,8 @@ pub enum Resource {
     Index,
     /// Where each slot's samples lie, for slots of several sizes.
     Places,
+    /// The level of each flat block, and where its samples lie.
+    Blocks,
     /// The transfer function's knots.
     Knots,
     /// The picture that rays are stored to.
@@ -57,12 +59,13 @@ pub enum Content<'a> {
 
 impl Resource {
     /// All resources.
-    pub const ALL: [Resource; 16] = [
+    pub const ALL: [Resource; 17] = [
         Resource::Frame,
         Resource::Atlas,
         Resource::AtlasSampler,
         Resource::Index,
         Resource::Places,
+        Resource::Blocks,
         Resource::Knots,
         Resource::Picture,
         Resource::Inputs,
@@ -84,6 +87,7 @@ impl Resource {
             Resource::AtlasSampler => "atlas_sampler",
             Resource::Index => "index",
             Resource::Places => "places",
+            Resource::Blocks => "blocks",
             Resource::Knots => "knots",
             Resource::Picture => "picture",
             Resource::Inputs => "inputs",
@@ -113,6 +117,7 @@ impl FramePlan {
             Resource::Atlas => Some(Content::Texture(self.field.slots())),
             Resource::Index => Some(Content::Chunks(&**self.field.index())),
             Resource::Places => self.field.slots().place_table().map(Content::Chunks),
+            Resource::Blocks => self.field.slots().block_table().map(Content::Chunks),
             Resource::Knots => bytes(bytemuck::cast_slice(&KnotUniform::of(self))),
             Resource::Occupancy => self.occupancy.as_ref().map(|occupancy| Content::Chunks(&**occupancy)),
             Resource::Beams => self.beams.as_ref().and_then(|beams| bytes(bytemuck::cast_slice(&beams.spans()))),

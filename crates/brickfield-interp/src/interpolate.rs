@@ -3,7 +3,7 @@
 use brickfield_core::glam::UVec3;
 use brickfield_core::{BlockLayout, Interblock, Level};
 
-use crate::{Neighbourhood, Real, block_weights};
+use crate::{Neighbourhood, Real};
 
 /// The value at a position in sample space (sample 0 at 0), between blocks of any resolution.
 ///
@@ -21,18 +21,13 @@ pub fn interpolate<T: Real>(
     mut fetch: impl FnMut(UVec3) -> T,
 ) -> T {
     let around = Neighbourhood::around(layout, position);
-    let blocks: [Option<UVec3>; 8] = std::array::from_fn(|b| around.block(b));
-    let inset = |block: UVec3| layout.inset(block, level(block)).to_array().map(T::from_f64);
-    let own_block = blocks[around.own()].expect("a position has a block of its own");
-    let own_inset = inset(own_block);
-    if (0..3).all(|axis| around.rho()[axis].abs() >= own_inset[axis]) {
+    let own_block = around.own_block();
+    if around.is_inside(layout.inset(own_block, level(own_block)).to_array().map(T::from_f64)) {
         return fetch(own_block);
     }
-    let insets = blocks.map(|block| block.map_or([T::ONE; 3], &inset));
-    let weights = block_weights(scheme, around.rho(), around.own(), &insets);
     let mut value = T::ZERO;
-    for (weight, block) in weights.into_iter().zip(blocks) {
-        if let (true, Some(block)) = (weight > T::ZERO, block) {
+    for (b, weight) in around.weights(layout, scheme, level).into_iter().enumerate() {
+        if let (true, Some(block)) = (weight > T::ZERO, around.block(b)) {
             value = value + weight * fetch(block);
         }
     }

@@ -1,9 +1,9 @@
 //! The eight blocks around a position.
 
-use brickfield_core::BlockLayout;
 use brickfield_core::glam::UVec3;
+use brickfield_core::{BlockLayout, Interblock, Level};
 
-use crate::Real;
+use crate::{Real, block_weights};
 
 /// The eight blocks that meet nearest to a position, and where it lies between them.
 ///
@@ -55,6 +55,25 @@ impl<T: Real> Neighbourhood<T> {
     #[inline]
     pub fn own(&self) -> usize {
         self.own
+    }
+
+    /// The block that holds the position.
+    #[inline]
+    pub fn own_block(&self) -> UVec3 {
+        self.own_block
+    }
+
+    /// Whether the position is among the samples of its own block, which keep `inset` away from other blocks.
+    #[inline]
+    pub fn is_inside(&self, inset: [T; 3]) -> bool {
+        (0..3).all(|axis| self.rho[axis].abs() >= inset[axis])
+    }
+
+    /// The weights of the eight blocks, by the levels of blocks.
+    pub fn weights(&self, layout: &BlockLayout, scheme: Interblock, level: impl Fn(UVec3) -> Level) -> [T; 8] {
+        let inset = |block: UVec3| layout.inset(block, level(block)).to_array().map(T::from_f64);
+        let insets = std::array::from_fn(|b| self.block(b).map_or([T::ONE; 3], &inset));
+        block_weights(scheme, self.rho, self.own, &insets)
     }
 
     /// How far the position is past the blocks' common face along each axis, in voxels; infinite where no block is on the other side.

@@ -27,7 +27,7 @@ const fn one_of(path: &'static str, name: &'static str, text: &'static str) -> M
     Module { name, path, text: Cow::Borrowed(text) }
 }
 
-const EMBEDDED: [Module; 19] = [
+const EMBEDDED: [Module; 21] = [
     own("frame", include_str!("wesl/frame.wesl")),
     own("scalar", include_str!("wesl/scalar.wesl")),
     own("transfer", include_str!("wesl/transfer.wesl")),
@@ -36,6 +36,8 @@ const EMBEDDED: [Module; 19] = [
     own("texels", include_str!("wesl/texels.wesl")),
     one_of("field", "field/bricks", include_str!("wesl/field/bricks.wesl")),
     one_of("field", "field/placed", include_str!("wesl/field/placed.wesl")),
+    one_of("field", "field/blocks", include_str!("wesl/field/blocks.wesl")),
+    own("interblock", include_str!("wesl/interblock.wesl")),
     own("quadrature", include_str!("wesl/quadrature.wesl")),
     own("preintegrated", include_str!("wesl/preintegrated.wesl")),
     own("segments", include_str!("wesl/segments.wesl")),

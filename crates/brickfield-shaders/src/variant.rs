@@ -1,7 +1,8 @@
 //! Which shader a plan needs.
 
+use brickfield_core::Interblock;
 use brickfield_frame::{
-    Division, Feature, FeatureSet, Fetch, FramePlan, Lengths, Placement, Places, QuadratureRule, ShaderFunction,
+    Division, Feature, FeatureSet, Fetch, FramePlan, Join, Lengths, Placement, Places, QuadratureRule, ShaderFunction,
 };
 
 use crate::passes::has_long_rays;
@@ -38,16 +39,43 @@ pub enum FieldKind {
     Bricks,
     /// Slots of several sizes: a table says where their samples lie.
     Placed,
+    /// Flat blocks: a row for each says its level and its first texel.
+    Blocks(Join),
 }
 
 impl FieldKind {
     /// All kinds.
-    pub const ALL: [FieldKind; 2] = [FieldKind::Bricks, FieldKind::Placed];
+    pub const ALL: [FieldKind; 6] = [
+        FieldKind::Bricks,
+        FieldKind::Placed,
+        FieldKind::Blocks(Join::Shared),
+        FieldKind::Blocks(Join::Blend(Interblock::MinimumDistance)),
+        FieldKind::Blocks(Join::Blend(Interblock::BoundarySplit)),
+        FieldKind::Blocks(Join::Blend(Interblock::MaximumDistance)),
+    ];
+
+    /// The kind of a plan's field.
+    pub fn of(plan: &FramePlan) -> FieldKind {
+        match plan.field().slots().places() {
+            Places::Even(_) => FieldKind::Bricks,
+            Places::Table { .. } => FieldKind::Placed,
+            Places::Blocks(_) => FieldKind::Blocks(plan.field().join()),
+        }
+    }
 
     const fn module(self) -> &'static str {
         match self {
             FieldKind::Bricks => "field/bricks",
             FieldKind::Placed => "field/placed",
+            FieldKind::Blocks(_) => "field/blocks",
+        }
+    }
+
+    /// The scheme between flat blocks.
+    const fn scheme(self) -> Option<Interblock> {
+        match self {
+            FieldKind::Blocks(Join::Blend(scheme)) => Some(scheme),
+            _ => None,
         }
     }
 }
@@ -222,10 +250,7 @@ impl Variant {
     pub fn of(plan: &FramePlan, entry: Entry) -> Variant {
         Variant {
             features: plan.features(),
-            field: match plan.field().slots().places() {
-                Places::Even(_) => FieldKind::Bricks,
-                Places::Table { .. } => FieldKind::Placed,
-            },
+            field: FieldKind::of(plan),
             rule: plan.sampling().rule(),
             segments: Segments::of(plan),
             search: KnotSearch::of(plan),
@@ -266,13 +291,15 @@ impl Variant {
             ("one_node", !two_nodes),
             ("two_nodes", two_nodes),
             ("reads_field", self.reads_field()),
-            ("placed", self.field == FieldKind::Placed),
-            ("wide_blocks", has(Feature::MultiLevel) || has(Feature::SkipEmpty) || self.field == FieldKind::Placed),
+            ("lattice_origin", self.field != FieldKind::Bricks),
+            ("wide_blocks", has(Feature::MultiLevel) || has(Feature::SkipEmpty) || self.field != FieldKind::Bricks),
+            ("blend", self.field.scheme().is_some()),
             ("long_rays", self.long_rays),
             ("integer_samples", self.integer_samples),
         ];
         let derived = derived.into_iter().map(|(name, holds)| (name.to_owned(), holds));
-        let segments = self.segments.conditions();
+        let scheme = |s: Interblock| (s.name().replace('-', "_"), self.field.scheme() == Some(s));
+        let segments = self.segments.conditions().chain(Interblock::ALL.map(scheme));
         features.chain(rules).chain(segments).chain(functions).chain(self.search.conditions()).chain(derived).collect()
     }
 }

@@ -2,7 +2,8 @@
 
 use std::collections::HashSet;
 
-use brickfield_frame::{Division, Feature, FeatureSet, Fetch, Lengths, QuadratureRule, Resource, ShaderFunction};
+use brickfield_core::Interblock;
+use brickfield_frame::{Division, Feature, FeatureSet, Fetch, Join, Lengths, QuadratureRule, Resource, ShaderFunction};
 use brickfield_shaders::{
     BindingKind, Entry, FieldKind, KnotSearch, Segments, ShaderError, ShaderLibrary, Specialised, Surfaces, Variant,
     specialise,
@@ -47,9 +48,11 @@ fn variant(options: &[usize; N_OPTIONS]) -> Option<Variant> {
     let Segments { surfaces, division, lengths } = variant.segments;
     let is_nominal = lengths == Lengths::Nominal;
     let is_drawn = surfaces != Surfaces::Shells && division == Division::Brick && !variant.long_rays;
+    let is_of_blocks = matches!(variant.field, FieldKind::Blocks(_));
     let is_asked_for = (!is_nominal || variant.rule == QuadratureRule::MidpointExponential)
         && (variant.entry != Entry::Proxy || is_drawn)
-        && (variant.field == FieldKind::Bricks || !features.contains(Feature::SkipMacrocells));
+        && (variant.field == FieldKind::Bricks || !features.contains(Feature::SkipMacrocells))
+        && (is_of_blocks || !features.contains(Feature::ShortBlocks));
     is_asked_for.then_some(variant)
 }
 
@@ -99,6 +102,8 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
                 assert_eq!(uses(Resource::Facets), has_facets);
                 let reads = uses(Resource::Index) && variant.features.contains(Feature::TransferLookup);
                 assert_eq!(uses(Resource::Places), uses(Resource::Index) && variant.field == FieldKind::Placed);
+                let is_of_blocks = matches!(variant.field, FieldKind::Blocks(_));
+                assert_eq!(uses(Resource::Blocks), uses(Resource::Index) && is_of_blocks);
                 assert!(!reads || uses(Resource::Atlas));
             }
             Entry::Proxy => {
@@ -164,10 +169,21 @@ fn what_a_scene_does_not_need_is_left_out() {
     assert_eq!(resources(&skipping), [Frame, Index, Knots, Picture]);
 
     let general = march(all, rule);
+    let of_blocks = |features| {
+        let mut variant = Variant::new(features, rule, Entry::March);
+        variant.field = FieldKind::Blocks(Join::Blend(Interblock::MaximumDistance));
+        compile(&variant)
+    };
     for feature in Feature::ALL.into_iter().filter(|f| *f != Feature::HardwareFilter) {
-        let without = march(all.without(feature), rule);
-        assert!(without.counts.expressions < general.counts.expressions, "{}", feature.name());
-        assert!(without.spirv().unwrap().len() < general.spirv().unwrap().len(), "{}", feature.name());
+        let (with, without) = match feature {
+            Feature::ShortBlocks => {
+                let features = all.without(Feature::SkipMacrocells);
+                (of_blocks(features), of_blocks(features.without(feature)))
+            }
+            _ => (general.clone(), march(all.without(feature), rule)),
+        };
+        assert!(without.counts.expressions < with.counts.expressions, "{}", feature.name());
+        assert!(without.spirv().unwrap().len() < with.spirv().unwrap().len(), "{}", feature.name());
     }
     let least = march(FeatureSet::default(), rule);
     assert!(least.counts.functions < general.counts.functions);

@@ -39,7 +39,7 @@ fn placed(field: &Field) -> Field {
     let (index, slots) = (field.index(), field.slots());
     let side = slots.brick_side().expect("prepare stores bricks of one size");
     let shape = AtlasShape::fit(slots.n_slots(), side, 4096).expect("cases are small");
-    let nowhere = Place { texel: UVec3::ZERO, n: UVec3::ONE, level: Level(0), first: DVec3::ZERO, axes: Axes::Xyz };
+    let nowhere = Place::even(UVec3::ZERO, UVec3::ONE, Level(0), DVec3::ZERO);
     let (mut places, mut samples) = (vec![nowhere; slots.n_slots() as usize], vec![None; slots.n_slots() as usize]);
     let dims = index.dims();
     let cells = (0..dims.element_product()).map(|i| UVec3::new(i % dims.x, i / dims.x % dims.y, i / dims.x / dims.y));
@@ -48,8 +48,9 @@ fn placed(field: &Field) -> Field {
         let axes = Axes::ALL[slot as usize % Axes::ALL.len()];
         // The samples up to the volume's last one, and one behind it.
         let read = brick.local(field.last_sample()).map(f64::ceil).as_uvec3() + 1;
-        let n = axes.to_texture(brick.n.min(read).as_dvec3()).as_uvec3();
-        places[slot as usize] = Place { texel: shape.origin(slot), n, axes, ..brick };
+        let even = Place::even(shape.origin(slot), brick.n.min(read), brick.level, brick.first);
+        let n = axes.to_texture(even.n.as_dvec3()).as_uvec3();
+        places[slot as usize] = Place { n, axes, ..even };
         let bytes = slots.samples(slot).expect("a slot of the index").bytes();
         samples[slot as usize] = Some(Arc::new(Chunk::new(permuted(bytes, slots.format(), side, (n, axes)))));
     }
@@ -87,7 +88,7 @@ fn averages(plan: &FramePlan, volume: &Volume) -> Field {
         let stored = |i: u32| (((linear(at(i)) - decode.offset) / decode.scale) as f32).to_le_bytes();
         entries.push((cell, IndexEntry::Resident { slot, reach: Reach(0) }));
         let texel = UVec3::new(0, 0, slot * (BLOCK + 2));
-        places.push(Place { texel, n: UVec3::splat(n), level, first, axes: Axes::Xyz });
+        places.push(Place::even(texel, UVec3::splat(n), level, first));
         samples.push(Some(Arc::new(Chunk::new((0..n * n * n).flat_map(stored).collect::<Vec<u8>>()))));
     }
     let texels = UVec3::new(BLOCK + 2, BLOCK + 2, cells.element_product() * (BLOCK + 2));

@@ -45,7 +45,7 @@ impl Ambiguity {
         let optics = |i: usize| (knots[i].extinction, knots[i].color);
         let jump = |i: &usize| knots[*i].value == knots[i + 1].value && optics(*i) != optics(i + 1);
         Ambiguity {
-            several_kinds: has_several_kinds(field.plan()),
+            several_kinds: has_several_kinds(field),
             jumps: (0..knots.len() - 1).filter(jump).map(|i| knots[i].value).collect(),
             max_extinction: knots.iter().map(|k| k.extinction).fold(0.0, f64::max),
             coarsest: coarsest(field.plan()),
@@ -151,7 +151,7 @@ impl Ambiguity {
         if !self.several_kinds || part.cell.is_some() {
             return values;
         }
-        let kind = |c: UVec3| Kind::of(field.plan(), c);
+        let kind = |c: UVec3| Kind::of(field, c);
         let (low, high) = (field.cell_at(q - delta), field.cell_at(q + delta));
         for cell in cells(low, high).filter(|c| kind(*c) != kind(own)) {
             values.push(field.value(&field.patch_of(cell), q));
@@ -162,12 +162,15 @@ impl Ambiguity {
 
     /// Adds both sides of the jumps that the value in `cell` is close to.
     fn beyond_jumps(&self, field: &impl FieldReader, cell: UVec3, q: DVec3, delta: DVec3, values: &mut Values) {
-        let (false, Some(at)) = (self.jumps.is_empty(), field.around(&field.patch_of(cell), q)) else { return };
-        let Some(value) = field.value(&field.patch_of(cell), q) else { return };
-        let (gain, (min, max)) = (field.gain(), at.range());
+        if self.jumps.is_empty() {
+            return;
+        }
+        let patch = field.patch_of(cell);
+        let (Some(around), Some(value)) = (field.around(&patch, q), field.value(&patch, q)) else { return };
+        let (gain, (min, max)) = (field.gain(), around.range);
         let offset = field.plan().field().slots().decode().offset;
         let magnitude = gain * min.abs().max(max.abs()) + offset.abs() + self.jumps[0].abs();
-        let reach = gain * (max - min) * delta.element_sum() + ROUNDING * magnitude;
+        let reach = gain * field.moved(&patch, q, delta) + ROUNDING * magnitude;
         for jump in self.jumps.iter().filter(|j| (value - **j).abs() <= reach) {
             values.extend([Some(jump.next_down()), Some(*jump)]);
         }
@@ -188,13 +191,17 @@ fn grown(b: &Aabb, delta: DVec3) -> Aabb {
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Resident(Level),
+    /// Of a field that is continuous between levels.
+    Blended,
     Empty,
 }
 
 impl Kind {
-    fn of(plan: &FramePlan, cell: UVec3) -> Kind {
+    fn of(field: &impl FieldReader, cell: UVec3) -> Kind {
+        let plan = field.plan();
         match plan.field().index().at(cell) {
-            IndexEntry::Resident { .. } => Kind::Resident(plan.field().level_at(cell)),
+            IndexEntry::Resident { .. } if field.jumps_between_levels() => Kind::Resident(plan.field().level_at(cell)),
+            IndexEntry::Resident { .. } => Kind::Blended,
             IndexEntry::Empty { .. } => Kind::Empty,
         }
     }
@@ -205,8 +212,8 @@ fn coarsest(plan: &FramePlan) -> Level {
     all.map(|cell| plan.field().level_at(cell)).max().unwrap_or(Level(0))
 }
 
-fn has_several_kinds(plan: &FramePlan) -> bool {
-    let mut kinds = cells(UVec3::ZERO, plan.field().index().dims() - 1).map(|cell| Kind::of(plan, cell));
+fn has_several_kinds(field: &impl FieldReader) -> bool {
+    let mut kinds = cells(UVec3::ZERO, field.plan().field().index().dims() - 1).map(|cell| Kind::of(field, cell));
     let first = kinds.next();
     kinds.any(|k| Some(k) != first)
 }

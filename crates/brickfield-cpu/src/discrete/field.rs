@@ -2,19 +2,20 @@
 
 use std::marker::PhantomData;
 
-use brickfield_core::Place;
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_frame::{FramePlan, IndexEntry};
+use brickfield_core::{Interblock, Place};
+use brickfield_frame::{BlockPlaces, FramePlan, IndexEntry, Join, Places, SampleFormat};
+use brickfield_interp::interpolate;
 
 /// How a sample is read from a slot's bytes.
-pub(super) trait Stored: Sync {
+trait Stored: Sync {
     /// The stored number of sample `i` of a slot.
     fn read(bytes: &[u8], i: usize) -> f64;
 }
 
-pub(super) struct Unorm8;
-pub(super) struct Unorm16;
-pub(super) struct Float32;
+struct Unorm8;
+struct Unorm16;
+struct Float32;
 
 impl Stored for Unorm8 {
     #[inline(always)]
@@ -38,16 +39,53 @@ impl Stored for Float32 {
     }
 }
 
+/// Work on a field of any kind.
+pub(super) trait Work {
+    type Output;
+    fn run(self, field: &impl FieldReader) -> Self::Output;
+}
+
+/// Does some work on the field of a plan.
+pub(super) fn with_field<W: Work>(plan: &FramePlan, work: W) -> W::Output {
+    match plan.field().slots().format() {
+        SampleFormat::Unorm8 => with_join::<Unorm8, W>(plan, work),
+        SampleFormat::Unorm16 => with_join::<Unorm16, W>(plan, work),
+        SampleFormat::Float32 => with_join::<Float32, W>(plan, work),
+    }
+}
+
+fn with_join<S: Stored, W: Work>(plan: &FramePlan, work: W) -> W::Output {
+    let shared = Shared::<S> { plan, stored: PhantomData };
+    match (plan.field().join(), plan.field().slots().places()) {
+        (Join::Blend(scheme), Places::Blocks(places)) => work.run(&Blended { shared, places, scheme }),
+        _ => work.run(&shared),
+    }
+}
+
 /// A field: from a position to the patch that owns it, and to the value there.
 pub(super) trait FieldReader: Sync {
     /// The plan whose field it is.
     fn plan(&self) -> &FramePlan;
 
     /// The patch around an index cell.
-    fn patch_of(&self, cell: UVec3) -> Patch;
+    #[inline]
+    fn patch_of(&self, cell: UVec3) -> Patch {
+        let field = self.plan().field();
+        let IndexEntry::Resident { slot, .. } = field.index().at(cell) else { return Patch { slot: None } };
+        Patch { slot: field.place_at(cell).map(|place| (slot, place)) }
+    }
 
-    /// The samples that a patch has around a clamped position; `None` if it is empty.
-    fn around(&self, patch: &Patch, q: DVec3) -> Option<Cell>;
+    /// The stored number that a patch has at a clamped position; `None` if it is empty.
+    fn stored(&self, patch: &Patch, q: DVec3) -> Option<f64>;
+
+    /// The samples between which the number lies that a patch has at a clamped position; `None` if it is empty.
+    fn around(&self, patch: &Patch, q: DVec3) -> Option<Around>;
+
+    /// How far the stored number may move if the position is off by `delta`; 0 if the patch is empty.
+    fn moved(&self, patch: &Patch, q: DVec3, delta: DVec3) -> f64;
+
+    /// Whether the field jumps where two resident blocks of different levels meet.
+    fn jumps_between_levels(&self) -> bool;
 
     /// The position that the field is evaluated at.
     #[inline]
@@ -64,9 +102,8 @@ pub(super) trait FieldReader: Sync {
     /// The data value that a patch has at a clamped position; `None` if it is empty.
     #[inline]
     fn value(&self, patch: &Patch, q: DVec3) -> Option<f64> {
-        let cell = self.around(patch, q)?;
         let slots = self.plan().field().slots();
-        Some(slots.decode().value(trilinear(&cell) / slots.format().unit()))
+        Some(slots.decode().value(self.stored(patch, q)? / slots.format().unit()))
     }
 
     /// The data value at a sample position; `None` where its patch is empty.
@@ -90,30 +127,54 @@ pub(super) struct Patch {
     slot: Option<(u32, Place)>,
 }
 
+/// The samples between which a number lies.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Around {
+    /// Least and greatest of them.
+    pub(super) range: (f64, f64),
+    /// The widest range of those that are interpolated in one block.
+    pub(super) widest: f64,
+}
+
 /// The eight samples around a position, and where it lies between them.
-pub(super) struct Cell {
+struct Cell {
     /// Stored numbers, x varying fastest.
-    pub(super) samples: [f64; 8],
+    samples: [f64; 8],
     /// Place in the cell, 0 to 1.
-    pub(super) fraction: DVec3,
+    fraction: DVec3,
 }
 
 impl Cell {
     /// Least and greatest of the samples.
-    pub(super) fn range(&self) -> (f64, f64) {
+    fn range(&self) -> (f64, f64) {
         self.samples.iter().fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(*v), b.max(*v)))
     }
 }
 
-/// A field whose slots share their border samples ([`Join::Shared`](brickfield_frame::Join::Shared)): every value is one slot's.
-pub(super) struct Shared<'a, S> {
+/// A field of which every value is one slot's ([`Join::Shared`]).
+struct Shared<'a, S> {
     plan: &'a FramePlan,
     stored: PhantomData<S>,
 }
 
-impl<'a, S: Stored> Shared<'a, S> {
-    pub(super) fn new(plan: &'a FramePlan) -> Self {
-        Shared { plan, stored: PhantomData }
+impl<S: Stored> Shared<'_, S> {
+    /// The samples of a slot around a clamped position.
+    #[inline]
+    fn cell(&self, slot: u32, place: &Place, q: DVec3) -> Option<Cell> {
+        let slots = self.plan.field().slots();
+        let Some(samples) = slots.samples(slot) else {
+            return Some(Cell { samples: [slots.one_sample(slot)?; 8], fraction: DVec3::ZERO });
+        };
+        let last = place.n_in_space() - 1;
+        let s = place.local(q).clamp(DVec3::ZERO, last.as_dvec3());
+        let i = s.as_uvec3().min(last.saturating_sub(UVec3::ONE));
+        let strides = strides(place);
+        let base: usize = (0..3).map(|axis| i[axis] as usize * strides[axis]).sum();
+        // Along an axis with a single sample there is no neighbour.
+        let next = [0, 1, 2].map(|axis| if last[axis] > 0 { strides[axis] } else { 0 });
+        let corner = |c: usize| (c & 1) * next[0] + (c >> 1 & 1) * next[1] + (c >> 2) * next[2];
+        let samples = std::array::from_fn(|c| S::read(samples.bytes(), base + corner(c)));
+        Some(Cell { samples, fraction: s - i.as_dvec3() })
     }
 }
 
@@ -124,26 +185,84 @@ impl<S: Stored> FieldReader for Shared<'_, S> {
     }
 
     #[inline]
-    fn patch_of(&self, cell: UVec3) -> Patch {
-        let field = self.plan.field();
-        let IndexEntry::Resident { slot, .. } = field.index().at(cell) else { return Patch { slot: None } };
-        Patch { slot: field.place_at(cell).map(|place| (slot, place)) }
+    fn stored(&self, patch: &Patch, q: DVec3) -> Option<f64> {
+        let (slot, place) = patch.slot?;
+        self.cell(slot, &place, q).map(|cell| trilinear(&cell))
     }
 
-    #[inline]
-    fn around(&self, patch: &Patch, q: DVec3) -> Option<Cell> {
+    fn around(&self, patch: &Patch, q: DVec3) -> Option<Around> {
         let (slot, place) = patch.slot?;
-        let bytes = self.plan.field().slots().samples(slot)?.bytes();
-        let last = place.n_in_space() - 1;
-        let s = place.local(q).clamp(DVec3::ZERO, last.as_dvec3());
-        let i = s.as_uvec3().min(last.saturating_sub(UVec3::ONE));
-        let strides = strides(&place);
-        let base: usize = (0..3).map(|axis| i[axis] as usize * strides[axis]).sum();
-        // Along an axis with a single sample there is no neighbour.
-        let next = [0, 1, 2].map(|axis| if last[axis] > 0 { strides[axis] } else { 0 });
-        let corner = |c: usize| (c & 1) * next[0] + (c >> 1 & 1) * next[1] + (c >> 2) * next[2];
-        let samples = std::array::from_fn(|c| S::read(bytes, base + corner(c)));
-        Some(Cell { samples, fraction: s - i.as_dvec3() })
+        let range = self.cell(slot, &place, q)?.range();
+        Some(Around { range, widest: range.1 - range.0 })
+    }
+
+    /// By the slope between samples.
+    fn moved(&self, patch: &Patch, q: DVec3, delta: DVec3) -> f64 {
+        let (Some((_, place)), Some(around)) = (patch.slot, self.around(patch, q)) else { return 0.0 };
+        // The last two samples of a short block may be half as far apart.
+        let closest = if place.is_even() { 1.0 } else { 0.5 };
+        around.widest * delta.element_sum() / (closest * f64::from(place.level.stride()))
+    }
+
+    fn jumps_between_levels(&self) -> bool {
+        true
+    }
+}
+
+/// Flat blocks that are blended.
+struct Blended<'a, S> {
+    shared: Shared<'a, S>,
+    places: &'a BlockPlaces,
+    scheme: Interblock,
+}
+
+impl<S: Stored> Blended<'_, S> {
+    /// The number at a clamped position, from the samples of up to eight blocks.
+    fn blended(&self, q: DVec3, mut see: impl FnMut(&Cell)) -> f64 {
+        let level = |block| self.places.row(block).level;
+        let fetch = |block| {
+            let slot = self.places.layout().ordinal(block) as u32;
+            let cell = self.shared.cell(slot, &self.places.place(block), q).expect("a flat block has samples");
+            see(&cell);
+            trilinear(&cell)
+        };
+        interpolate(self.places.layout(), self.scheme, q.to_array(), level, fetch)
+    }
+}
+
+impl<S: Stored> FieldReader for Blended<'_, S> {
+    #[inline]
+    fn plan(&self) -> &FramePlan {
+        self.shared.plan
+    }
+
+    fn stored(&self, patch: &Patch, q: DVec3) -> Option<f64> {
+        patch.slot.map(|_| self.blended(q, |_| ()))
+    }
+
+    fn around(&self, patch: &Patch, q: DVec3) -> Option<Around> {
+        patch.slot?;
+        let mut around = Around { range: (f64::MAX, f64::MIN), widest: 0.0 };
+        self.blended(q, |cell| {
+            let (min, max) = cell.range();
+            around.range = (around.range.0.min(min), around.range.1.max(max));
+            around.widest = around.widest.max(max - min);
+        });
+        Some(around)
+    }
+
+    /// By looking: weights and samples change.
+    fn moved(&self, patch: &Patch, q: DVec3, delta: DVec3) -> f64 {
+        let Some(here) = self.stored(patch, q) else { return 0.0 };
+        let along = |axis: DVec3| {
+            let there = |sign: f64| self.blended(self.clamped(q + sign * delta * axis), |_| ());
+            (there(1.0) - here).abs().max((there(-1.0) - here).abs())
+        };
+        DVec3::AXES.into_iter().map(along).sum()
+    }
+
+    fn jumps_between_levels(&self) -> bool {
+        false
     }
 }
 

@@ -12,12 +12,12 @@ mod walk;
 
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Aabb, Image};
-use brickfield_frame::{FramePlan, PlanRay, SampleFormat};
+use brickfield_frame::{FramePlan, PlanRay};
 use brickfield_optics::{QuadratureRule, RayState, Segment};
 use rayon::prelude::*;
 
 use ambiguity::Ambiguity;
-use field::{FieldReader, Float32, Shared, Stored, Unorm8, Unorm16};
+use field::{FieldReader, Work, with_field};
 pub use rounding::{filter_rounding, position_rounding};
 use walk::{CutSegment, clip, parts};
 
@@ -51,10 +51,15 @@ pub struct Discrete {
 /// Accuracy: that of f64, about 1e-15 times the number of segments of a ray. Cost: about 0.16 us a sample and core,
 /// 0.4 us where several levels, jumps or bricks' own segments make pixels ambiguous.
 pub fn discrete(plan: &FramePlan) -> Discrete {
-    match plan.field().slots().format() {
-        SampleFormat::Unorm8 => render::<Unorm8>(plan),
-        SampleFormat::Unorm16 => render::<Unorm16>(plan),
-        SampleFormat::Float32 => render::<Float32>(plan),
+    with_field(plan, Rendering)
+}
+
+struct Rendering;
+
+impl Work for Rendering {
+    type Output = Discrete;
+    fn run(self, field: &impl FieldReader) -> Discrete {
+        render(field)
     }
 }
 
@@ -68,11 +73,10 @@ struct Pixel {
     n_visible_segments: u32,
 }
 
-fn render<S: Stored>(plan: &FramePlan) -> Discrete {
-    let field = Shared::<S>::new(plan);
-    let ambiguity = Ambiguity::new(&field);
-    let size = plan.size();
-    let row = |y: u32| (0..size.x).map(|x| pixel(&field, &ambiguity, UVec2::new(x, y))).collect::<Vec<_>>();
+fn render(field: &impl FieldReader) -> Discrete {
+    let ambiguity = Ambiguity::new(field);
+    let size = field.plan().size();
+    let row = |y: u32| (0..size.x).map(|x| pixel(field, &ambiguity, UVec2::new(x, y))).collect::<Vec<_>>();
     let rows: Vec<Vec<Pixel>> = (0..size.y).into_par_iter().map(row).collect();
     let mut image = Image::transparent(size);
     for (to, from) in image.pixels_mut().iter_mut().zip(rows.iter().flatten()) {

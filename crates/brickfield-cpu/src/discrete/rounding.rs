@@ -24,7 +24,7 @@ use brickfield_optics::transmittance;
 use rayon::prelude::*;
 
 use super::change::{Values, spread};
-use super::field::{FieldReader, Float32, Shared, Stored, Unorm8, Unorm16};
+use super::field::{Around, FieldReader, Patch, Work, with_field};
 use super::relative;
 use super::walk::{CutSegment, clip, parts};
 
@@ -58,17 +58,18 @@ enum Cause {
 }
 
 fn of_plan(plan: &FramePlan, cause: Cause) -> Vec<f64> {
-    match plan.field().slots().format() {
-        SampleFormat::Unorm8 => of_picture::<Unorm8>(plan, cause),
-        SampleFormat::Unorm16 => of_picture::<Unorm16>(plan, cause),
-        SampleFormat::Float32 => of_picture::<Float32>(plan, cause),
-    }
+    with_field(plan, OfPicture(cause))
 }
 
-fn of_picture<S: Stored>(plan: &FramePlan, cause: Cause) -> Vec<f64> {
-    let (field, size) = (Shared::<S>::new(plan), plan.size());
-    let pixel = |i: u32| of_pixel(&field, UVec2::new(i % size.x, i / size.x), cause);
-    (0..size.x * size.y).into_par_iter().map(pixel).collect()
+struct OfPicture(Cause);
+
+impl Work for OfPicture {
+    type Output = Vec<f64>;
+    fn run(self, field: &impl FieldReader) -> Vec<f64> {
+        let size = field.plan().size();
+        let pixel = |i: u32| of_pixel(field, UVec2::new(i % size.x, i / size.x), self.0);
+        (0..size.x * size.y).into_par_iter().map(pixel).collect()
+    }
 }
 
 fn of_pixel(field: &impl FieldReader, at: UVec2, cause: Cause) -> f64 {
@@ -76,9 +77,9 @@ fn of_pixel(field: &impl FieldReader, at: UVec2, cause: Cause) -> f64 {
     let ray = &plan.rays().ray(at.x, at.y);
     let Some(span) = clip(ray, &relative(plan.domain(), plan.rays().center), ray.t_eye) else { return 0.0 };
     let delta = plan.rays().rounding(at.x, at.y, ray, span.start.abs().max(span.end.abs())) / AT_WORST;
-    let stray = |range: f64, stride: f64| match cause {
-        Cause::Positions => range * delta.element_sum() / stride,
-        Cause::Filter { sub_texel_bits } => filtered(field, range, sub_texel_bits),
+    let stray = |patch: &Patch, q: DVec3, around: &Around| match cause {
+        Cause::Positions => field.gain() * field.moved(patch, q, delta),
+        Cause::Filter { sub_texel_bits } => filtered(field, field.gain() * around.widest, sub_texel_bits),
     };
     let (mut bound, mut least_depth) = (0.0, 0.0);
     for part in parts(plan, ray, span) {
@@ -100,18 +101,19 @@ fn filtered(field: &impl FieldReader, range: f64, bits: u32) -> f64 {
     (weights + code).min(range + code)
 }
 
-/// The values that a node at `q` may have; none where its block is empty. `stray` takes the range of the samples around it, in
-/// data values, and how many voxels they are apart.
-fn values(field: &impl FieldReader, part: CutSegment, q: DVec3, stray: impl Fn(f64, f64) -> f64) -> Values {
+/// The values that a node at `q` may have; none where its block is empty. `stray` says how far the value may move, in data values.
+fn values(
+    field: &impl FieldReader,
+    part: CutSegment,
+    q: DVec3,
+    stray: impl Fn(&Patch, DVec3, &Around) -> f64,
+) -> Values {
     let q = field.clamped(q);
-    let cell = part.cell.unwrap_or_else(|| field.cell_at(q));
-    let patch = field.patch_of(cell);
-    let (Some(value), Some(at)) = (field.value(&patch, q), field.around(&patch, q)) else {
+    let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(q)));
+    let (Some(value), Some(around)) = (field.value(&patch, q), field.around(&patch, q)) else {
         return vec![None];
     };
-    let stride = f64::from(field.plan().field().level_at(cell).stride());
-    let (min, max) = at.range();
-    candidates(field.plan().transfer(), value, stray(field.gain() * (max - min), stride))
+    candidates(field.plan().transfer(), value, stray(&patch, q, &around))
 }
 
 /// The values at which extinction and colour are extreme: the node's own first, the ends, and both sides of knots between.

@@ -17,9 +17,10 @@ use std::time::Instant;
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{BrickSide, Image};
 use brickfield_frame::{
-    Backend, Capabilities, Description, Evaluate, Frame, FramePlan, Places, PlanRay, RenderError, SampleFormat,
+    Backend, Capabilities, Description, Evaluate, Frame, FramePlan, Join, Places, PlanRay, RenderError, SampleFormat,
     ShaderFunction, Timing, check_memory,
 };
+use brickfield_interp::Neighbourhood;
 use rayon::prelude::*;
 
 use brick::{Float32, Stored, Unorm8, Unorm16};
@@ -151,7 +152,7 @@ fn dispatch_side<S: Stored, W: Work>(plan: &FramePlan, work: W) -> W::Output {
         Places::Even(BrickSide::S16) => work.run(&F32Plan::<16, S>::new(plan)),
         Places::Even(BrickSide::S32) => work.run(&F32Plan::<32, S>::new(plan)),
         Places::Even(BrickSide::S64) => work.run(&F32Plan::<64, S>::new(plan)),
-        Places::Table { .. } => work.run(&PlacedPlan::<S>::new(plan)),
+        Places::Table { .. } | Places::Blocks(_) => work.run(&PlacedPlan::<S>::new(plan)),
     }
 }
 
@@ -245,7 +246,19 @@ fn evaluate(renderer: &impl Renderer, function: ShaderFunction, [x, y, z, _]: [f
             let d = plan.rays().ray(x as u32, y as u32).direction.as_vec3();
             [d.x, d.y, d.z, 0.0]
         }
+        ShaderFunction::WeightsLow => weights(plan, [x, y, z]).map_or([0.0; 4], |[low, _]| low),
+        ShaderFunction::WeightsHigh => weights(plan, [x, y, z]).map_or([0.0; 4], |[_, high]| high),
     }
+}
+
+/// The weights of the eight flat blocks around a position; `None` if no blocks are blended.
+fn weights(plan: &FramePlan, position: [f32; 3]) -> Option<[[f32; 4]; 2]> {
+    let (Join::Blend(scheme), Places::Blocks(places)) = (plan.field().join(), plan.field().slots().places()) else {
+        return None;
+    };
+    let around = Neighbourhood::around(places.layout(), position);
+    let [a, b, c, d, e, f, g, h] = around.weights(places.layout(), scheme, |block| places.row(block).level);
+    Some([[a, b, c, d], [e, f, g, h]])
 }
 
 /// Refuses pictures that are too large.

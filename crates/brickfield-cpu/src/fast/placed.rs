@@ -1,11 +1,12 @@
-//! A plan whose slots are of several sizes: each segment by itself, through the table of places.
+//! A plan whose slots are of several sizes, or flat blocks: each segment by itself.
 
 use std::marker::PhantomData;
 use std::ops::Range;
 
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Level, Place};
-use brickfield_frame::{Division, FramePlan, PlanRay};
+use brickfield_frame::{Division, FramePlan, Join, Places, PlanRay};
+use brickfield_interp::interpolate;
 
 use super::Renderer;
 use super::brick::Stored;
@@ -15,7 +16,7 @@ use super::march::{Path, clip, one};
 use super::segment::Ray32;
 use crate::blocks::Blocks;
 
-/// A plan with a table of places, whose samples are stored as `S`.
+/// A plan whose places differ, and whose samples are stored as `S`.
 pub(super) struct PlacedPlan<'a, S> {
     plan: &'a FramePlan,
     transfer: Classifier,
@@ -33,10 +34,26 @@ impl<'a, S: Stored> PlacedPlan<'a, S> {
     fn value_in(&self, cell: UVec3, q: DVec3) -> Option<f32> {
         let field = self.plan.field();
         let slot = field.index().at(cell).slot()?;
-        let place = field.place_at(cell)?;
-        let bytes = field.slots().samples(slot)?.bytes();
-        let stored = trilinear(&place, q.clamp(DVec3::ZERO, field.last_sample()), |i| S::number(bytes, i));
-        Some((stored - self.numbers.bias) * self.numbers.gain + self.numbers.offset)
+        let q = q.clamp(DVec3::ZERO, field.last_sample());
+        let stored = match (field.join(), field.slots().places()) {
+            (Join::Blend(scheme), Places::Blocks(places)) => {
+                let layout = places.layout();
+                let fetch = |block| f64::from(self.stored(layout.ordinal(block) as u32, &places.place(block), q));
+                interpolate(layout, scheme, q.to_array(), |block| places.row(block).level, fetch) as f32
+            }
+            _ => self.stored(slot, &field.place_at(cell)?, q),
+        };
+        Some(stored * self.numbers.gain + self.numbers.offset)
+    }
+
+    /// The stored number, less the bias, that a slot has at a clamped position.
+    fn stored(&self, slot: u32, place: &Place, q: DVec3) -> f32 {
+        let slots = self.plan.field().slots();
+        let number = match slots.samples(slot) {
+            Some(samples) => trilinear(place, q, |i| S::number(samples.bytes(), i)),
+            None => slots.one_sample(slot).unwrap_or_default() as f32,
+        };
+        number - self.numbers.bias
     }
 }
 

@@ -115,6 +115,10 @@ impl TextureShape {
     pub fn texels_of(self, slots: &Slots, slot: u32) -> (UVec3, UVec3) {
         match (slots.places(), self) {
             (Places::Table { places, .. }, _) => (places[slot as usize].texel, places[slot as usize].n),
+            (Places::Blocks(places), _) => {
+                let place = places.place(places.layout().block(slot as usize));
+                (place.texel, place.n)
+            }
             (Places::Even(side), TextureShape::Atlas(shape)) => (shape.origin(slot), UVec3::splat(side.n_samples())),
             (Places::Even(side), TextureShape::Table(_)) => (UVec3::ZERO, UVec3::splat(side.n_samples())),
         }
@@ -130,14 +134,8 @@ impl Slots {
     pub fn room(&self, held: Option<TextureShape>, max_texels: u32) -> Result<Room, RenderError> {
         let side = match self.places() {
             Places::Even(side) => *side,
-            Places::Table { texels, .. } if texels.max_element() > max_texels => {
-                return Err(RenderError::TextureTooLarge { texels: *texels, limit: max_texels });
-            }
-            Places::Table { texels, .. } => {
-                let shape = TextureShape::Table(*texels);
-                let change = if held == Some(shape) { RoomChange::Keep } else { RoomChange::Replace };
-                return Ok(Room { shape, change });
-            }
+            Places::Table { texels, .. } => return room_of_table(*texels, held, max_texels),
+            Places::Blocks(places) => return room_of_table(places.texels(), held, max_texels),
         };
         let n_bricks = self.n_slots();
         let room = |shape, change| Ok(Room { shape: TextureShape::Atlas(shape), change });
@@ -156,6 +154,21 @@ impl Slots {
         let too_large = RenderError::AtlasTooLarge { n_bricks, side: side.n_samples(), limit: max_texels };
         room(AtlasShape::fit(n_bricks, side, max_texels).ok_or(too_large)?, RoomChange::Replace)
     }
+}
+
+fn room_of_table(texels: UVec3, held: Option<TextureShape>, max_texels: u32) -> Result<Room, RenderError> {
+    if texels.max_element() > max_texels {
+        return Err(RenderError::TextureTooLarge { texels, limit: max_texels });
+    }
+    let shape = TextureShape::Table(texels);
+    let change = match held {
+        Some(held) if held == shape => RoomChange::Keep,
+        Some(TextureShape::Table(held)) if held.truncate() == texels.truncate() && held.z < texels.z => {
+            RoomChange::Grow
+        }
+        _ => RoomChange::Replace,
+    };
+    Ok(Room { shape, change })
 }
 
 #[cfg(test)]

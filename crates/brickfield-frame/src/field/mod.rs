@@ -7,16 +7,20 @@
 //! - **Join** ([`Join`]): how a value between two slots comes about.
 
 mod atlas;
+mod blocks;
 mod index;
+mod packing;
 mod slots;
 
 use std::sync::Arc;
 
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Aabb, Level, Place};
+use brickfield_core::{Aabb, BlockLayout, Interblock, Level, Place};
 
 pub use atlas::{AtlasShape, Room, RoomChange, TextureShape};
+pub use blocks::{BlockPlaces, BlockRow, BlockSamples};
 pub use index::{IndexEntry, IndexGrid, IndexLattice, Reach};
+pub use packing::Packing;
 pub use slots::{Decode, Places, SampleFormat, Slots, SlotsError};
 
 /// The field of a plan. Shares its parts with the fields of other frames.
@@ -33,8 +37,11 @@ pub struct Field {
 #[non_exhaustive]
 pub enum Join {
     /// Slots share their border samples: every position lies in one slot (LaMar, Hamann and Joy 1999, section 3.1).
+    /// Of flat blocks: the block that holds a position, alone.
     #[default]
     Shared,
+    /// Flat blocks share no samples: a value is one of up to eight of them (Ljung, Lundstroem and Ynnerman 2006, section 3.2).
+    Blend(Interblock),
 }
 
 /// Parts that do not make a field.
@@ -54,6 +61,16 @@ pub enum FieldError {
         "an index of cells of {cell_samples} samples from sample {origin} on for bricks of {side} samples, which have {} cells from sample 0 on", side - 1
     )]
     CellOfBricks { cell_samples: u32, origin: f64, side: u32 },
+    #[error(
+        "flat blocks of {side} voxels over {blocks} voxels, for a volume of {dims} and an index of cells of {cell_samples} samples from sample {origin} on"
+    )]
+    OtherBlocks { side: u32, blocks: UVec3, dims: UVec3, cell_samples: u32, origin: f64 },
+    #[error(
+        "the index names slot {slot} at {cell}: of flat blocks that is the block's number, {expected}, and each cell is one"
+    )]
+    SlotOfBlock { cell: UVec3, slot: u32, expected: u32 },
+    #[error("slots that are blended: only flat blocks are")]
+    BlendOfBricks,
 }
 
 impl Field {
@@ -72,16 +89,19 @@ impl Field {
             let cell_samples = lattice.cell_samples;
             return Err(FieldError::IndexDims { index: index.dims(), dims, cell_samples, expected });
         }
-        if let Some(slot) = index.slots().find(|slot| slots.samples(*slot).is_none()) {
+        if let Some(slot) = index.slots().find(|slot| !slots.has_samples(*slot)) {
             return Err(FieldError::NoSuchSlot { slot, n_slots: slots.n_slots() });
         }
         match slots.places() {
             Places::Even(side) if side.n_cells() != lattice.cell_samples || lattice.origin != 0.0 => {
                 let IndexLattice { cell_samples, origin } = lattice;
-                Err(FieldError::CellOfBricks { cell_samples, origin, side: side.n_samples() })
+                return Err(FieldError::CellOfBricks { cell_samples, origin, side: side.n_samples() });
             }
-            _ => Ok(Field { dims, index, slots, join }),
+            Places::Blocks(places) => check_blocks(dims, &index, places.layout())?,
+            _ if join != Join::Shared => return Err(FieldError::BlendOfBricks),
+            _ => {}
         }
+        Ok(Field { dims, index, slots, join })
     }
 
     /// A field of parts that may not fit.
@@ -156,9 +176,10 @@ impl Field {
                 let lattice = self.index.lattice();
                 let first = reach.block(cell).0.as_dvec3() * f64::from(lattice.cell_samples) + lattice.origin;
                 let n = UVec3::splat(side.n_samples());
-                Place { texel: UVec3::ZERO, n, level: reach.level_of_brick(), first, axes: Default::default() }
+                Place::even(UVec3::ZERO, n, reach.level_of_brick(), first)
             }
             Places::Table { places, .. } => places[slot as usize],
+            Places::Blocks(places) => places.place(cell),
         })
     }
 
@@ -169,27 +190,56 @@ impl Field {
             (IndexEntry::Empty { .. }, _) => Level(0),
             (IndexEntry::Resident { reach, .. }, Places::Even(_)) => reach.level_of_brick(),
             (IndexEntry::Resident { slot, .. }, Places::Table { places, .. }) => places[slot as usize].level,
+            (IndexEntry::Resident { .. }, Places::Blocks(places)) => places.row(cell).level,
         }
     }
 
-    /// Whether any slot in the index is coarser than level 0.
+    /// Whether any slot that is read is coarser than level 0.
     pub fn has_coarse(&self) -> bool {
+        self.levels().any(|level| level > Level(0))
+    }
+
+    /// Whether slots of different levels are read.
+    pub fn has_several_levels(&self) -> bool {
+        let mut levels = self.levels();
+        levels.next().is_some_and(|first| levels.any(|level| level != first))
+    }
+
+    /// Whether some block ends with a sample that averages fewer voxels than others of its level.
+    pub fn has_short_blocks(&self) -> bool {
         match self.slots.places() {
-            Places::Even(_) => self.index.resident_reaches().any(|reach| reach > Reach(0)),
-            Places::Table { places, .. } => self.index.slots().any(|slot| places[slot as usize].level > Level(0)),
+            Places::Blocks(places) => places.has_short_blocks(),
+            _ => false,
         }
     }
 
-    /// Whether slots of different levels are in the index.
-    pub fn has_several_levels(&self) -> bool {
-        match self.slots.places() {
-            Places::Even(_) => self.index.resident_reaches().nth(1).is_some(),
-            Places::Table { places, .. } => {
-                let mut levels = self.index.slots().map(|slot| places[slot as usize].level);
-                levels.next().is_some_and(|first| levels.any(|level| level != first))
-            }
+    /// The levels of the slots that are read: those in the index, and all flat blocks that are blended.
+    fn levels(&self) -> Box<dyn Iterator<Item = Level> + '_> {
+        match (self.slots.places(), self.join) {
+            (Places::Even(_), _) => Box::new(self.index.resident_reaches().map(Reach::level_of_brick)),
+            (Places::Table { places, .. }, _) => Box::new(self.index.slots().map(|slot| places[slot as usize].level)),
+            (Places::Blocks(places), Join::Blend(_)) => Box::new(places.rows().iter().map(|row| row.level)),
+            (Places::Blocks(places), _) => Box::new(self.index.slots().map(|slot| places.rows()[slot as usize].level)),
         }
     }
+}
+
+/// Whether an index is one of flat blocks: a cell for each block, whose slot is the block's number.
+fn check_blocks(dims: UVec3, index: &IndexGrid, layout: &BlockLayout) -> Result<(), FieldError> {
+    let (IndexLattice { cell_samples, origin }, side) = (index.lattice(), layout.side().n_voxels());
+    if layout.dims() != dims || cell_samples != side || origin != -0.5 {
+        return Err(FieldError::OtherBlocks { side, blocks: layout.dims(), dims, cell_samples, origin });
+    }
+    for (expected, cell) in layout.blocks().enumerate() {
+        let expected = expected as u32;
+        match index.at(cell) {
+            IndexEntry::Resident { slot, reach } if slot != expected || reach != Reach(0) => {
+                return Err(FieldError::SlotOfBlock { cell, slot, expected });
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use brickfield_core::glam::UVec3;
-use brickfield_core::{BrickSide, Place, Rescale, ScalarType, ValueRange};
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{BrickSide, Level, Place, Rescale, ScalarType, ValueRange};
 
+use super::{BlockPlaces, BlockSamples};
 use crate::{Chunk, Chunked, ContentId, PlaceUniform};
 
 /// How a sample is stored for a backend.
@@ -65,6 +66,15 @@ impl SampleFormat {
         }
     }
 
+    /// The stored number that a texture reads as `read`.
+    #[inline]
+    pub fn stored(self, read: f32) -> f64 {
+        match self {
+            SampleFormat::Unorm8 | SampleFormat::Unorm16 => (f64::from(read) * self.unit()).round(),
+            SampleFormat::Float32 => f64::from(read),
+        }
+    }
+
     /// The number that a texture read returns for sample `i` of some bytes; exact.
     #[inline]
     pub fn read(self, bytes: &[u8], i: usize) -> f64 {
@@ -109,6 +119,8 @@ pub enum Places {
     /// A place for each slot, in a texture of so many texels.
     #[allow(missing_docs)]
     Table { texels: UVec3, places: Vec<Place> },
+    /// All slots are flat blocks, each at a level of its own; a slot's number is its block's.
+    Blocks(BlockPlaces),
 }
 
 /// The samples that a frame needs, in slots: little endian, x of the texture fastest. A slot may hold no samples.
@@ -122,12 +134,16 @@ pub struct Slots {
     id: ContentId,
 }
 
-/// A table of places as shaders read it.
+/// A table of places as shaders read it, in pages.
 #[derive(Clone, Debug)]
 struct PlaceTable {
-    rows: Vec<PlaceUniform>,
+    bytes: Vec<u8>,
     id: ContentId,
+    pages: Vec<ContentId>,
 }
+
+/// Bytes of a table whose changes are brought to a device together.
+const PAGE_BYTES: usize = 4096;
 
 /// Slots are equal if their samples are.
 impl PartialEq for Slots {
@@ -150,6 +166,12 @@ pub enum SlotsError {
     Places { n_places: usize, n_slots: usize },
     #[error("slot {slot} lies at {} to {} in a texture of {texels} texels", place.texel, place.texel + place.n)]
     Outside { slot: usize, place: Place, texels: UVec3 },
+    #[error("slot {slot} has its last sample at {} instead of {even}: only flat blocks may", place.last)]
+    Uneven { slot: usize, place: Place, even: DVec3 },
+    #[error("slot {slot} at level {} has samples in its row: {is_in_row}; it has {n_samples}", level.0)]
+    OneSample { slot: usize, level: Level, is_in_row: bool, n_samples: usize },
+    #[error("a texture of {texels} texels for flat blocks; a row tells {most} apart")]
+    Rows { texels: UVec3, most: UVec3 },
 }
 
 impl Slots {
@@ -169,22 +191,26 @@ impl Slots {
                 check_bytes(&samples, |_| expected)?;
             }
             Places::Table { texels, places } => {
-                let (n_places, n_slots) = (places.len(), samples.len());
-                if n_places != n_slots {
-                    return Err(SlotsError::Places { n_places, n_slots });
-                }
-                let is_outside = |p: &Place| p.n.min_element() == 0 || (p.texel + p.n).cmpgt(*texels).any();
-                if let Some((slot, place)) = places.iter().enumerate().find(|(_, p)| is_outside(p)) {
-                    return Err(SlotsError::Outside { slot, place: *place, texels: *texels });
+                check_number(places.len(), samples.len())?;
+                for (slot, place) in places.iter().enumerate() {
+                    check_inside(slot, place, *texels)?;
+                    check_even(slot, place)?;
                 }
                 check_bytes(&samples, |slot| places[slot].n_samples() * format.n_bytes())?;
+            }
+            Places::Blocks(places) => {
+                check_number(places.rows().len(), samples.len())?;
+                places.check()?;
+                check_bytes(&samples, |slot| places.n_texels(slot) * format.n_bytes())?;
             }
         }
         let table = match &places {
             Places::Even(_) => None,
             Places::Table { places, .. } => {
-                Some(PlaceTable { rows: places.iter().map(PlaceUniform::of).collect(), id: ContentId::new() })
+                let rows: Vec<PlaceUniform> = places.iter().map(PlaceUniform::of).collect();
+                Some(PlaceTable::new(bytemuck::cast_slice(&rows)))
             }
+            Places::Blocks(places) => Some(PlaceTable::new(bytemuck::cast_slice(&places.packed()))),
         };
         Ok(Slots { format, decode, places, samples, table, id: ContentId::new() })
     }
@@ -224,13 +250,49 @@ impl Slots {
     pub fn brick_side(&self) -> Option<BrickSide> {
         match self.places {
             Places::Even(side) => Some(side),
-            Places::Table { .. } => None,
+            Places::Table { .. } | Places::Blocks(_) => None,
         }
     }
 
-    /// The table of places as shaders read it ([`PlaceUniform`]); `None` where arithmetic finds them.
+    /// The table of places as shaders read it ([`PlaceUniform`]); `None` where there is none.
     pub fn place_table(&self) -> Option<&dyn Chunked> {
-        self.table.as_ref().map(|table| table as &dyn Chunked)
+        match self.places {
+            Places::Even(_) | Places::Blocks(_) => None,
+            Places::Table { .. } => self.table.as_ref().map(|table| table as &dyn Chunked),
+        }
+    }
+
+    /// The rows of flat blocks as shaders read them; `None` of other slots.
+    pub fn block_table(&self) -> Option<&dyn Chunked> {
+        match self.places {
+            Places::Even(_) | Places::Table { .. } => None,
+            Places::Blocks(_) => self.table.as_ref().map(|table| table as &dyn Chunked),
+        }
+    }
+
+    /// The slots, whose table keeps the identity of the pages that are equal to pages of slots before them: a device is
+    /// brought the others.
+    #[must_use]
+    pub fn following(mut self, before: &Slots) -> Slots {
+        if let (Some(own), Some(before)) = (&mut self.table, &before.table) {
+            own.follow(before);
+        }
+        self
+    }
+
+    /// Whether a slot has samples: in the texture, or one in its row.
+    pub fn has_samples(&self, slot: u32) -> bool {
+        self.samples(slot).is_some() || self.one_sample(slot).is_some()
+    }
+
+    /// The stored number of a flat block that is one sample, which is in its row.
+    #[inline]
+    pub fn one_sample(&self, slot: u32) -> Option<f64> {
+        let Places::Blocks(places) = &self.places else { return None };
+        match places.rows().get(slot as usize)?.samples {
+            BlockSamples::One(read) => Some(self.format.stored(read)),
+            BlockSamples::Texture(_) => None,
+        }
     }
 
     /// Number of slots, those without samples included.
@@ -272,6 +334,24 @@ impl Slots {
     }
 }
 
+fn check_number(n_places: usize, n_slots: usize) -> Result<(), SlotsError> {
+    if n_places == n_slots { Ok(()) } else { Err(SlotsError::Places { n_places, n_slots }) }
+}
+
+/// Whether a place has texels, all of them in the texture.
+pub(super) fn check_inside(slot: usize, place: &Place, texels: UVec3) -> Result<(), SlotsError> {
+    let is_outside = place.n.min_element() == 0 || (place.texel + place.n).cmpgt(texels).any();
+    if is_outside { Err(SlotsError::Outside { slot, place: *place, texels }) } else { Ok(()) }
+}
+
+fn check_even(slot: usize, place: &Place) -> Result<(), SlotsError> {
+    if place.is_even() {
+        return Ok(());
+    }
+    let even = Place::even(place.texel, place.n_in_space(), place.level, place.first).last;
+    Err(SlotsError::Uneven { slot, place: *place, even })
+}
+
 fn check_bytes(samples: &[Option<Arc<Chunk>>], expected: impl Fn(usize) -> usize) -> Result<(), SlotsError> {
     let filled = samples.iter().enumerate().filter_map(|(slot, chunk)| Some((slot, chunk.as_ref()?)));
     for (slot, chunk) in filled {
@@ -293,6 +373,7 @@ impl Chunked for Slots {
         let n_samples = match &self.places {
             Places::Even(side) => side.n_samples_total(),
             Places::Table { places, .. } => places.iter().map(Place::n_samples).max().unwrap_or(0),
+            Places::Blocks(places) => (places.layout().side().n_voxels() as usize).pow(3),
         };
         n_samples * self.format.n_bytes()
     }
@@ -306,29 +387,47 @@ impl Chunked for Slots {
     }
 }
 
+impl PlaceTable {
+    fn new(bytes: &[u8]) -> PlaceTable {
+        let pages = (0..bytes.len().div_ceil(PAGE_BYTES)).map(|_| ContentId::new()).collect();
+        PlaceTable { bytes: bytes.to_vec(), id: ContentId::new(), pages }
+    }
+
+    fn follow(&mut self, before: &PlaceTable) {
+        if self.bytes == before.bytes {
+            self.id = before.id;
+        }
+        let pages = self.bytes.chunks(PAGE_BYTES).zip(before.bytes.chunks(PAGE_BYTES));
+        for ((own, (a, b)), id) in self.pages.iter_mut().zip(pages).zip(&before.pages) {
+            if a == b {
+                *own = *id;
+            }
+        }
+    }
+}
+
 impl Chunked for PlaceTable {
     fn id(&self) -> ContentId {
         self.id
     }
 
     fn chunk_bytes(&self) -> usize {
-        size_of_val(&self.rows[..])
+        PAGE_BYTES
     }
 
     fn n_chunks(&self) -> usize {
-        1
+        self.pages.len()
     }
 
-    fn chunk(&self, _: usize) -> Option<(ContentId, &[u8])> {
-        Some((self.id, bytemuck::cast_slice(&self.rows)))
+    fn chunk(&self, i: usize) -> Option<(ContentId, &[u8])> {
+        let start = i * PAGE_BYTES;
+        Some((self.pages[i], &self.bytes[start..self.bytes.len().min(start + PAGE_BYTES)]))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use brickfield_core::glam::DVec3;
-    use brickfield_core::{Axes, Level};
 
     #[test]
     fn a_rescale_follows_the_decoding() {
@@ -362,8 +461,7 @@ mod tests {
         let decode = Decode { scale: 1.0, offset: 0.0 };
         let even = Slots::even(BrickSide::S16, SampleFormat::Unorm8, decode, &[0; 4097]).unwrap_err().to_string();
         assert!(even.contains("4097 bytes are not whole bricks of 4096"), "{even}");
-        let place =
-            |texel| Place { texel, n: UVec3::new(2, 3, 1), level: Level(0), first: DVec3::ZERO, axes: Axes::Xyz };
+        let place = |texel| Place::even(texel, UVec3::new(2, 3, 1), Level(0), DVec3::ZERO);
         let table = |texel, n_bytes| {
             let places = Places::Table { texels: UVec3::splat(4), places: vec![place(texel)] };
             let samples = vec![Some(Arc::new(Chunk::new(vec![0; n_bytes])))];

@@ -1,0 +1,141 @@
+//! Where the samples of flat blocks lie.
+
+use brickfield_core::glam::UVec3;
+use brickfield_core::{BlockLayout, Level, Place};
+
+use super::SlotsError;
+use super::slots::check_inside;
+
+/// Flat blocks in a texture: for each block its level and its first texel, the rest is arithmetic (Ljung, Lundstroem and Ynnerman
+/// 2006, section 4, equation 12).
+#[derive(Clone, Debug, PartialEq)]
+pub struct BlockPlaces {
+    layout: BlockLayout,
+    texels: UVec3,
+    rows: Vec<BlockRow>,
+}
+
+/// The level of a block, and its samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub struct BlockRow {
+    pub level: Level,
+    pub samples: BlockSamples,
+}
+
+/// Where the samples of a flat block are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum BlockSamples {
+    /// The block is one sample, and takes no texel: here is the number that a texture read would return.
+    One(f32),
+    /// In the texture, from this texel on.
+    Texture(UVec3),
+}
+
+/// Bits of a texel's coordinates in a row: x, y, z.
+const TEXEL_BITS: [u32; 3] = [11, 11, 10];
+/// In a row's first word: the level is below it.
+const ONE_SAMPLE: u32 = 1 << 8;
+
+impl BlockPlaces {
+    /// The blocks of a layout, by number, in a texture of so many texels.
+    pub fn new(layout: BlockLayout, texels: UVec3, rows: Vec<BlockRow>) -> BlockPlaces {
+        BlockPlaces { layout, texels, rows }
+    }
+
+    /// Which blocks there are.
+    #[inline]
+    pub fn layout(&self) -> &BlockLayout {
+        &self.layout
+    }
+
+    /// The texture's size.
+    pub fn texels(&self) -> UVec3 {
+        self.texels
+    }
+
+    /// The rows of all blocks, by number.
+    #[inline]
+    pub fn rows(&self) -> &[BlockRow] {
+        &self.rows
+    }
+
+    /// The row of a block.
+    #[inline]
+    pub fn row(&self, block: UVec3) -> &BlockRow {
+        &self.rows[self.layout.ordinal(block)]
+    }
+
+    /// Where the samples of a block lie; the texel of a block that is one sample is 0.
+    #[inline]
+    pub fn place(&self, block: UVec3) -> Place {
+        let BlockRow { level, samples } = *self.row(block);
+        let (first, last) = self.layout.sample_ends(block, level);
+        let texel = match samples {
+            BlockSamples::One(_) => UVec3::ZERO,
+            BlockSamples::Texture(texel) => texel,
+        };
+        Place { texel, n: self.layout.n_samples(block, level), level, first, last, axes: Default::default() }
+    }
+
+    /// Texels of a slot.
+    pub(super) fn n_texels(&self, slot: usize) -> usize {
+        match self.rows[slot].samples {
+            BlockSamples::One(_) => 0,
+            BlockSamples::Texture(_) => self.place(self.layout.block(slot)).n_samples(),
+        }
+    }
+
+    /// Whether a block's last sample averages fewer voxels than others of its level.
+    pub(super) fn has_short_blocks(&self) -> bool {
+        let side = self.layout.side().n_voxels();
+        if self.layout.dims().to_array().into_iter().all(|n| n % side == 0) {
+            return false;
+        }
+        self.layout.blocks().zip(&self.rows).any(|(block, row)| {
+            let extent = self.layout.extent(block).to_array();
+            extent.into_iter().any(|n| n % row.level.stride() != 0)
+        })
+    }
+
+    /// The rows as shaders read them, two words each: the level, and whether the block is one sample; and its first texel
+    /// ([`TEXEL_BITS`] from the lowest), or the sample.
+    pub(super) fn packed(&self) -> Vec<[u32; 2]> {
+        let pack = |row: &BlockRow| {
+            let level = u32::from(row.level.0);
+            match row.samples {
+                BlockSamples::One(read) => [level | ONE_SAMPLE, read.to_bits()],
+                BlockSamples::Texture(texel) => [level, packed_texel(texel)],
+            }
+        };
+        self.rows.iter().map(pack).collect()
+    }
+
+    /// Whether all rows are of the layout's blocks, and in the texture.
+    pub(super) fn check(&self) -> Result<(), SlotsError> {
+        let (n_places, n_slots) = (self.rows.len(), self.layout.n_blocks_total());
+        if n_places != n_slots {
+            return Err(SlotsError::Places { n_places, n_slots });
+        }
+        let most = UVec3::from(TEXEL_BITS.map(|bits| 1 << bits));
+        if self.texels.cmpgt(most).any() {
+            return Err(SlotsError::Rows { texels: self.texels, most });
+        }
+        for (slot, row) in self.rows.iter().enumerate() {
+            let place = self.place(self.layout.block(slot));
+            let (n_samples, is_in_row) = (place.n_samples(), matches!(row.samples, BlockSamples::One(_)));
+            if row.level > self.layout.side().one_sample() || is_in_row != (n_samples == 1) {
+                return Err(SlotsError::OneSample { slot, level: row.level, is_in_row, n_samples });
+            }
+            if !is_in_row {
+                check_inside(slot, &place, self.texels)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn packed_texel(texel: UVec3) -> u32 {
+    let [x, y, _] = TEXEL_BITS;
+    texel.x | texel.y << x | texel.z << (x + y)
+}
