@@ -167,12 +167,17 @@ fn fill_level<T: BrickScalar>(
     Ok(TreeLevel { samples: T::wrap(samples), summaries })
 }
 
-/// Zeros that the system hands out page by page, so that the threads that fill them also fault them in.
 fn zeroed<T: BrickScalar>(n: usize, level: Level) -> Result<Vec<T>, BuildError> {
+    let needed_bytes = n as u64 * T::TYPE.n_bytes() as u64;
+    try_zeroed(n).ok_or(BuildError::OutOfMemory { level, needed_bytes })
+}
+
+/// Zeros that the system hands out page by page, so that the threads that fill them also fault them in; `None` if it has no
+/// memory.
+pub(crate) fn try_zeroed<T: Copy + Default>(n: usize) -> Option<Vec<T>> {
     // Asking first, without touching the memory, turns an abort into an error.
-    let asked = Vec::<T>::new().try_reserve_exact(n);
-    asked.map_err(|_| BuildError::OutOfMemory { level, needed_bytes: n as u64 * T::TYPE.n_bytes() as u64 })?;
-    Ok(vec![T::default(); n])
+    Vec::<T>::new().try_reserve_exact(n).ok()?;
+    Some(vec![T::default(); n])
 }
 
 #[cfg(test)]

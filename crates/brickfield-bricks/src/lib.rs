@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod bins;
+mod blocks;
 mod build;
 mod downsample;
 mod fill;
@@ -10,6 +11,10 @@ mod tally;
 mod tree;
 
 pub use bins::{Bins, Histogram, N_BINS};
+pub use blocks::{
+    BlockBuildError, BlockMemory, BlockOptions, BlockSource, BlockTally, BlockVolume, FetchError, NoSuchBlock,
+    SourceId, block_memory, build_blocks, fetch_values,
+};
 pub use build::{BuildError, BuildOptions, Progress, build_tree, build_tree_observed};
 pub use downsample::Downsampling;
 pub use memory::{LevelMemory, TreeMemory, tree_memory};
