@@ -16,7 +16,7 @@ pub enum Feature {
     SkipBesideBeams,
     /// Some slots are coarser than level 0.
     MultiLevel,
-    /// Some flat blocks end with a sample that averages fewer voxels than others.
+    /// Flat blocks at the volume's upper ends have a smaller extent.
     ShortBlocks,
     /// The transfer function has several knots, and needs a lookup.
     TransferLookup,

@@ -1,6 +1,8 @@
 #![doc = include_str!("../README.md")]
 
 mod backends;
+mod blocks;
+mod encode;
 mod picture;
 mod prepare;
 mod residency;
@@ -14,10 +16,12 @@ pub mod options;
 pub mod overlay;
 
 pub use backends::{AdapterInfo, BackendError, BackendKind, BackendStatus, Validation, backends, open_backend};
+pub use blocks::{BlockResidency, BlockStyle, PrepareBlocksError, TransparentBlocks, prepare_blocks};
 pub use brickfield_bricks as bricks;
 pub use brickfield_core as core;
 pub use brickfield_cpu as cpu;
 pub use brickfield_frame as frame;
+pub use brickfield_interp as interp;
 pub use brickfield_io as io;
 pub use brickfield_lod as lod;
 pub use brickfield_optics as optics;

@@ -2,7 +2,7 @@
 
 use brickfield_bricks::BrickTree;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
-use brickfield_core::{Aabb, BrickId, BrickLayout, Level, ValueRange};
+use brickfield_core::{Aabb, BrickId, BrickLayout, Grid, Level, ValueRange};
 use brickfield_frame::{
     DarkRegions, Division, Drawing, FramePlan, IndexEntry, Placement, PlacementError, PlanError, PlanParts, RayFrame,
     Sampling, SamplingError, Steps,
@@ -108,22 +108,10 @@ fn plan_selection(
     selection: &Selection,
     residency: &mut Residency,
 ) -> Result<FramePlan, PrepareError> {
-    check_values(tree)?;
+    check_values(tree.summary(tree.layout().root()).range)?;
     check_layout(tree, selection)?;
-    let grid = tree.grid();
-    let domain = clipped_domain(tree, scene.clip)?;
-    let step_world = scene.step_voxels * grid.spacing().min_element();
-    if !(step_world.is_finite() && step_world > 0.0) {
-        return Err(PrepareError::Step { step_voxels: scene.step_voxels });
-    }
-    let sampling = Sampling::new(step_world, scene.rule, scene.mode)?;
-    let sampling = sampling.divided(scene.division).weighted(scene.lengths)?;
-    check_segments(grid.world_box().diagonal() / step_world)?;
     let coarsest = selection.drawn().map(|id| id.level).max().unwrap_or(Level(0));
-    let steps = Steps::of(&sampling, scene.placement, coarsest)?;
-    let rays = RayFrame::new(&scene.camera, grid, scene.size, &volume_box(tree), &steps);
-    check_segments(rays.n_segments)?;
-    check_facets(&rays)?;
+    let Course { domain, sampling, rays } = Course::new(tree.grid(), scene, coarsest)?;
     let resident = resident_bricks(tree, scene, selection, &domain, residency);
     if resident.len() >= IndexEntry::MAX_SLOTS as usize {
         return Err(PrepareError::TooManyBricks { n_bricks: resident.len(), limit: IndexEntry::MAX_SLOTS });
@@ -131,7 +119,7 @@ fn plan_selection(
     let drawing = match scene.technique {
         Technique::RayCasting => Drawing::Rays,
         Technique::Polygons(target) => {
-            check_polygons(tree, &rays, step_world, resident.len())?;
+            check_polygons(tree, &rays, sampling.step_world(), resident.len())?;
             Drawing::Polygons { back_to_front: from_back_to_front(tree, scene, &resident), target }
         }
     };
@@ -190,7 +178,7 @@ fn check_layout(tree: &BrickTree, selection: &Selection) -> Result<(), PrepareEr
     Err(PrepareError::ForeignSelection { selected: of(selected), own: of(own) })
 }
 
-fn check_size(size: UVec2) -> Result<(), PrepareError> {
+pub(crate) fn check_size(size: UVec2) -> Result<(), PrepareError> {
     let sides = 1..=MAX_IMAGE;
     if sides.contains(&size.x) && sides.contains(&size.y) {
         return Ok(());
@@ -198,8 +186,8 @@ fn check_size(size: UVec2) -> Result<(), PrepareError> {
     Err(PrepareError::Size { size, limit: MAX_IMAGE })
 }
 
-fn check_values(tree: &BrickTree) -> Result<(), PrepareError> {
-    let range = tree.summary(tree.layout().root()).range;
+/// Whether renderers take the values of a volume.
+pub(crate) fn check_values(range: ValueRange) -> Result<(), PrepareError> {
     let magnitude = range.min.abs().max(range.max.abs());
     let is_wide = range.min == range.max || range.max - range.min >= LEAST_WIDTH;
     if magnitude <= MOST_VALUE && is_wide {
@@ -215,17 +203,40 @@ fn check_segments(n_segments: f64) -> Result<(), PrepareError> {
     Err(PrepareError::TooManySegments { n_segments, limit: MAX_SEGMENTS })
 }
 
-/// The volume's box in sample space.
-fn volume_box(tree: &BrickTree) -> Aabb {
-    to_sample_space(tree.grid().index_box())
+/// The rays of a scene through a grid, and their segments.
+pub(crate) struct Course {
+    /// The part of sample space that is integrated.
+    pub(crate) domain: Aabb,
+    pub(crate) sampling: Sampling,
+    pub(crate) rays: RayFrame,
 }
 
-fn to_sample_space(index: Aabb) -> Aabb {
+impl Course {
+    /// `coarsest` is the coarsest level that is drawn.
+    pub(crate) fn new(grid: &Grid, scene: &Scene, coarsest: Level) -> Result<Course, PrepareError> {
+        let domain = clipped_domain(grid, scene.clip)?;
+        let step_world = scene.step_voxels * grid.spacing().min_element();
+        if !(step_world.is_finite() && step_world > 0.0) {
+            return Err(PrepareError::Step { step_voxels: scene.step_voxels });
+        }
+        let sampling = Sampling::new(step_world, scene.rule, scene.mode)?;
+        let sampling = sampling.divided(scene.division).weighted(scene.lengths)?;
+        check_segments(grid.world_box().diagonal() / step_world)?;
+        let steps = Steps::of(&sampling, scene.placement, coarsest)?;
+        let volume = to_sample_space(grid.index_box());
+        let rays = RayFrame::new(&scene.camera, grid, scene.size, &volume, &steps);
+        check_segments(rays.n_segments)?;
+        check_facets(&rays)?;
+        Ok(Course { domain, sampling, rays })
+    }
+}
+
+pub(crate) fn to_sample_space(index: Aabb) -> Aabb {
     Aabb { min: index.min - 0.5, max: index.max - 0.5 }
 }
 
-fn clipped_domain(tree: &BrickTree, clip: Option<Aabb>) -> Result<Aabb, PrepareError> {
-    let whole = volume_box(tree);
+fn clipped_domain(grid: &Grid, clip: Option<Aabb>) -> Result<Aabb, PrepareError> {
+    let whole = to_sample_space(grid.index_box());
     let Some(clip) = clip else { return Ok(whole) };
     // NaN fails too.
     if clip.is_empty() || !(clip.min.is_finite() && clip.max.is_finite()) {
@@ -249,7 +260,7 @@ fn resident_bricks(
     let mut is_seen = |id: BrickId| !residency.is_transparent(tree, &scene.transfer, id);
     let in_domain = |id: &BrickId| !to_sample_space(tree.layout().index_box(*id)).intersection(domain).is_empty();
     let drawn = selection.drawn().filter(in_domain);
-    match segment_reach(tree, scene) {
+    match segment_reach(tree.grid(), scene, tree.layout().side().n_cells()) {
         0 => drawn.filter(|id| is_seen(*id)).collect(),
         reach => {
             let seen = selection.cut().bricks().iter().copied().filter(|id| is_seen(*id));
@@ -259,18 +270,17 @@ fn resident_bricks(
     }
 }
 
-/// How many bricks of level 0 a segment can span along an axis whose light depends on both its ends.
-fn segment_reach(tree: &BrickTree, scene: &Scene) -> u32 {
+/// How many blocks of `n_cells` voxels a segment can span along an axis, if its light depends on both its ends; else 0.
+pub(crate) fn segment_reach(grid: &Grid, scene: &Scene, n_cells: u32) -> u32 {
     if scene.rule != QuadratureRule::PreIntegrated || scene.division == Division::Brick {
         return 0;
     }
-    let spacing = tree.grid().spacing();
     // A sheared direction matrix can make a world step longer in voxels than the spacing says: take the map's own norm.
-    let turn = tree.grid().world_to_index().matrix3;
+    let turn = grid.world_to_index().matrix3;
     let voxels_per_unit =
         [turn.x_axis, turn.y_axis, turn.z_axis].into_iter().map(DVec3::length_squared).sum::<f64>().sqrt();
-    let voxels = scene.step_voxels * spacing.min_element() * voxels_per_unit;
-    (voxels / f64::from(tree.layout().side().n_cells())).ceil().min(f64::from(u32::MAX)) as u32
+    let voxels = scene.step_voxels * grid.spacing().min_element() * voxels_per_unit;
+    (voxels / f64::from(n_cells)).ceil().min(f64::from(u32::MAX)) as u32
 }
 
 #[cfg(test)]
@@ -278,7 +288,7 @@ mod tests {
     use super::*;
     use crate::{BackendKind, Validation, open_backend};
     use brickfield_bricks::{BuildOptions, build_tree};
-    use brickfield_core::{BrickSide, Camera, Grid, Knot, Projection, Rescale, TransferFunction, Volume};
+    use brickfield_core::{BrickSide, Camera, Knot, Projection, Rescale, TransferFunction, Volume};
     use brickfield_lod::{Answer, Tile, select_by};
 
     #[test]

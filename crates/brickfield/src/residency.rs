@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use brickfield_bricks::{BrickSamples, BrickTree, TreeId, with_brick_samples};
+use brickfield_bricks::{BrickTree, TreeId};
 use brickfield_core::glam::UVec3;
-use brickfield_core::{BrickId, Level, Scalar, ScalarType, TransferFunction};
+use brickfield_core::{BrickId, Level, TransferFunction};
 use brickfield_frame::{
     Chunk, DarkRegions, Decode, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, MacrocellRanges,
     Occupancy, Places, Reach, SampleFormat, Slots,
@@ -13,6 +13,7 @@ use brickfield_frame::{
 use rayon::prelude::*;
 
 use crate::Scene;
+use crate::encode::encode;
 
 /// The bricks of the last frame, in their slots, and the ranges and distances of their macrocells.
 ///
@@ -227,28 +228,8 @@ impl Transparent {
 
 /// A brick's samples in the stored form of [`SampleFormat::encoding`].
 fn gather(tree: &BrickTree, id: BrickId, format: SampleFormat, decode: Decode) -> Chunk {
-    let mut bytes = vec![0; tree.layout().side().n_samples_total() * format.n_bytes()];
-    encode(tree.samples(id), tree.scalar_type(), decode, &mut bytes);
-    Chunk::new(bytes)
-}
-
-fn encode(samples: BrickSamples<'_>, scalar: ScalarType, decode: Decode, out: &mut [u8]) {
-    match scalar {
-        ScalarType::U8 | ScalarType::U16 => samples.copy_le_bytes(out),
-        ScalarType::I8 | ScalarType::I16 => {
-            samples.copy_le_bytes(out);
-            // Two's complement with the top bit turned is the value shifted by half its range.
-            out.iter_mut().skip(scalar.n_bytes() - 1).step_by(scalar.n_bytes()).for_each(|high| *high ^= 0x80);
-        }
-        ScalarType::U32 | ScalarType::I32 | ScalarType::F32 | ScalarType::F64 => {
-            with_brick_samples!(samples, s => encode_f32(s, decode, out));
-        }
-    }
-}
-
-fn encode_f32<T: Scalar>(samples: &[T], decode: Decode, out: &mut [u8]) {
-    for (chunk, s) in out.chunks_exact_mut(4).zip(samples) {
-        let read = (s.to_f64() - decode.offset) / decode.scale;
-        chunk.copy_from_slice(&(read as f32).to_le_bytes());
-    }
+    let samples = tree.samples(id);
+    let mut bytes = vec![0; samples.n_bytes()];
+    samples.copy_le_bytes(&mut bytes);
+    Chunk::new(encode(bytes, tree.scalar_type(), format, decode))
 }

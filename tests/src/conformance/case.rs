@@ -3,10 +3,13 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use brickfield::bricks::BrickTree;
+use brickfield::bricks::{BlockVolume, BrickTree};
 use brickfield::frame::{FramePlan, ShaderFunction};
-use brickfield::{PrepareError, Residency, Scene, Skipping, Technique, prepare};
-use brickfield_core::Volume;
+use brickfield::{
+    BlockResidency, BlockStyle, PrepareBlocksError, PrepareError, Residency, Scene, Skipping, Technique, prepare,
+    prepare_blocks,
+};
+use brickfield_core::{Level, Volume};
 
 use super::plan_mutants::PlanMutant;
 use super::shader_mutants::ShaderMutant;
@@ -61,6 +64,18 @@ pub struct PictureTest {
     pub triangles_at_a_time: Option<u32>,
     /// How the samples are stored.
     pub storage: Storage,
+    /// The flat blocks that are drawn instead of the octree.
+    pub blocks: Option<FlatBlocks>,
+}
+
+/// Flat blocks, and how they are drawn.
+pub struct FlatBlocks {
+    /// The blocks.
+    pub volume: BlockVolume,
+    /// The level of each block, by number.
+    pub levels: Vec<Level>,
+    /// How values between them come about.
+    pub style: BlockStyle,
 }
 
 /// Whether a picture shows anything.
@@ -126,17 +141,31 @@ impl PictureTest {
     pub fn plans(&self) -> Result<Plans, PrepareError> {
         let technique = Technique::RayCasting;
         let complete = Scene { skipping: Skipping::Off, technique, ..self.scene.clone() };
-        let mut replayed = prepare(&self.tree, &self.scene, &mut Residency::default())?;
+        let mut replayed = self.prepare(&self.scene)?;
         if let Some(n) = self.triangles_at_a_time {
             replayed = replayed.in_batches_of(n);
         }
-        let complete = prepare(&self.tree, &complete, &mut Residency::default())?;
+        let complete = self.prepare(&complete)?;
         let volume = match &self.oracle {
             Oracle::Volume(volume) | Oracle::EveryLevel(volume) => Some(&**volume),
             Oracle::None => None,
         };
         let stored = |plan| self.storage.of(plan, volume);
         Ok(Plans { replayed: stored(replayed), complete: stored(complete) })
+    }
+
+    /// The plan of a scene of the subject.
+    ///
+    /// # Errors
+    /// A scene that `prepare` refuses.
+    pub fn prepare(&self, scene: &Scene) -> Result<FramePlan, PrepareError> {
+        let Some(FlatBlocks { volume, levels, style }) = &self.blocks else {
+            return prepare(&self.tree, scene, &mut Residency::default());
+        };
+        match prepare_blocks(volume, scene, levels, *style, &mut BlockResidency::default()) {
+            Err(PrepareBlocksError::Prepare(error)) => Err(error),
+            plan => Ok(plan.expect("a level for each block in memory")),
+        }
     }
 }
 

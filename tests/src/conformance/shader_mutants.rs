@@ -51,8 +51,8 @@ mutants! {
     /// Positions are not clamped to the first and last sample.
     NO_CLAMP: "no-clamp", "field/bricks", "value_at", "clamp(local(area, p), vec3f(0.0), area.last)" => "local(area, p)";
     /// Index rows are as long as columns.
-    INDEX_STRIDE: "index-stride", "index", "word_at", "index[cell.x + dims.x * (cell.y + dims.y * cell.z)]"
-        => "index[cell.x + dims.y * (cell.y + dims.x * cell.z)]";
+    INDEX_STRIDE: "index-stride", "index", "cell_number", "cell.x + dims.x * (cell.y + dims.y * cell.z)"
+        => "cell.x + dims.y * (cell.y + dims.x * cell.z)";
     /// The next slot's brick.
     ATLAS_ROW: "atlas-row", "field/bricks", "texel_of", "let row = slot / bricks.x;" => "let row = slot / bricks.y;";
     /// Coarse bricks are read as if they were fine.
@@ -131,9 +131,41 @@ mutants! {
     /// A pass begins at the ray's first segment.
     PASS_RESTARTS: "pass-restarts", "march", "integrate_on", "walk.k = max(walk.k, first_segment());" => "";
     /// 16-bit samples are counted from the first knot's as fractions, not as integers.
-    FRACTIONS_OF_16_BITS: "fractions-of-16-bits", "texels", "load",
-        "round(textureLoad(atlas, i, 0).x * 65535.0) - counted_from()"
-        => "(textureLoad(atlas, i, 0).x - counted_from() / 65535.0) * 65535.0";
+    FRACTIONS_OF_16_BITS: "fractions-of-16-bits", "texels", "counted",
+        "round(read * 65535.0) - counted_from()" => "(read - counted_from() / 65535.0) * 65535.0";
+    /// Blocks beyond the volume's upper faces have weight.
+    NO_MISSING_BLOCKS: "no-missing-blocks", "field/blocks", "weights_at",
+        "select(area.cell + 1u == frame.index_dims.xyz, area.cell == vec3u(0u), upper)" => "vec3<bool>(false)";
+    /// Only the lower faces of the volume have no block beyond.
+    NO_UPPER_CLAMP: "no-upper-clamp", "field/blocks", "weights_at",
+        "select(area.cell + 1u == frame.index_dims.xyz, area.cell == vec3u(0u), upper)"
+        => "select(vec3<bool>(false), area.cell == vec3u(0u), upper)";
+    /// Samples lie at the corner of their block, not in the middle of the voxels that they average.
+    BLOCK_SAMPLES_AT_CORNER: "block-samples-at-corner", "field/blocks", "samples_of",
+        "samples.first = corner_of(cell) + inset_of(extent, samples.stride);" => "samples.first = corner_of(cell) + 0.5;";
+    /// The last sample of a short block is as far away as others.
+    NO_STRETCH: "no-stretch", "field/blocks", "samples_of",
+        "samples.stretch = samples.stride / (0.5 * samples.stride + 0.5 * averaged);" => "samples.stretch = vec3f(1.0);";
+    /// Weights of blocks across an edge are not limited, as equation 6 has it.
+    LITERAL_WEIGHTS: "literal-weights", "interblock", "block_weights",
+        "let most = vec4f(max(outside.x, max(outside.y, outside.z)));" => "let most = vec4f(1.0);";
+    /// Weights do not add up to 1.
+    NOT_NORMALISED_WEIGHTS: "not-normalised-weights", "interblock", "block_weights",
+        "let sum = dot(weights.low, vec4f(1.0)) + dot(weights.high, vec4f(1.0));" => "let sum = 1.0;";
+    /// The second and third of eight blocks are taken for each other.
+    BLOCKS_SWAPPED: "blocks-swapped", "field/blocks", "one_of_eight", "vec3u(b & 1u, (b >> 1u) & 1u, b >> 2u)"
+        => "vec3u((b >> 1u) & 1u, b & 1u, b >> 2u)";
+    /// Blocks of one sample are black.
+    ONE_SAMPLE_FORGOTTEN: "one-sample-forgotten", "field/blocks", "read_among", "counted(samples.one)" => "counted(0.0)";
+    /// Maximum distance ends at the face.
+    MAXIMUM_TO_THE_FACE: "maximum-to-the-face", "interblock", "edge_weights", "(rho + lower) / (lower + upper)"
+        => "(rho + lower) / lower";
+    /// Minimum distance is maximum distance.
+    MINIMUM_IS_MAXIMUM: "minimum-is-maximum", "interblock", "edge_weights", "0.5 + 0.5 * rho / min(lower, upper)"
+        => "(rho + lower) / (lower + upper)";
+    /// The boundary is split at the wrong side.
+    SPLIT_SWAPPED: "split-swapped", "interblock", "edge_weights", "select(upper, lower, rho < 0.0)"
+        => "select(lower, upper, rho < 0.0)";
     /// Rays end at a transmittance of 1/5.
     ENDS_EARLY: "ends-early", "ending", "ended", "exp(-seen.w) < transmittance_floor()" => "exp(-seen.w) < 0.2";
     /// Bricks have the steps of level 0, whatever their level.

@@ -86,16 +86,10 @@ impl BlockPlaces {
         }
     }
 
-    /// Whether a block's last sample averages fewer voxels than others of its level.
+    /// Whether blocks at the volume's upper ends have a smaller extent.
     pub(super) fn has_short_blocks(&self) -> bool {
         let side = self.layout.side().n_voxels();
-        if self.layout.dims().to_array().into_iter().all(|n| n % side == 0) {
-            return false;
-        }
-        self.layout.blocks().zip(&self.rows).any(|(block, row)| {
-            let extent = self.layout.extent(block).to_array();
-            extent.into_iter().any(|n| n % row.level.stride() != 0)
-        })
+        self.layout.dims().to_array().into_iter().any(|n| n % side != 0)
     }
 
     /// The rows as shaders read them, two words each: the level, and whether the block is one sample; and its first texel

@@ -205,7 +205,7 @@ impl Field {
         levels.next().is_some_and(|first| levels.any(|level| level != first))
     }
 
-    /// Whether some block ends with a sample that averages fewer voxels than others of its level.
+    /// Whether flat blocks at the volume's upper ends have a smaller extent.
     pub fn has_short_blocks(&self) -> bool {
         match self.slots.places() {
             Places::Blocks(places) => places.has_short_blocks(),

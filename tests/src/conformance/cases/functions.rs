@@ -25,7 +25,7 @@ pub(super) fn cases() -> Vec<Case> {
     [scalars(), classifications(), segments(), samples(), rays()].into_iter().flatten().collect()
 }
 
-fn function(
+pub(super) fn function(
     name: impl Into<String>,
     mutants: Vec<Mutant>,
     plan: impl Fn() -> FramePlan + Send + Sync + 'static,

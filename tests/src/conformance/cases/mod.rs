@@ -1,5 +1,6 @@
 //! The cases.
 
+mod blocks;
 mod extremes;
 mod fast;
 mod fields;
@@ -26,6 +27,7 @@ pub fn all() -> Vec<Case> {
         polygons::cases(),
         fast::cases(),
         storages::cases(),
+        blocks::cases(),
         extremes::cases(),
         real::cases(),
     ]

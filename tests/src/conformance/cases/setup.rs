@@ -1,13 +1,17 @@
 //! How a case states its scene: volume and transfer function, then the settings that differ from the defaults.
 
-use brickfield::Scene;
-use brickfield::bricks::{BuildOptions, Downsampling, build_tree};
+use std::sync::Arc;
+
+use brickfield::bricks::{BlockOptions, BlockSource, BuildOptions, Downsampling, build_blocks, build_tree};
 use brickfield::lod::Criterion;
+use brickfield::{BlockStyle, Scene};
 use brickfield_core::glam::{DVec3, UVec2};
-use brickfield_core::{Aabb, BrickSide, Camera, Projection, ScalarType, TransferFunction, Volume};
+use brickfield_core::{
+    Aabb, BlockLayout, BlockSide, BrickSide, Camera, Level, Projection, ScalarType, TransferFunction, Volume,
+};
 use brickfield_optics::QuadratureRule;
 
-use super::super::case::{Case, Check, Mutant, NoData, Oracle, PictureTest, Shows};
+use super::super::case::{Case, Check, FlatBlocks, Mutant, NoData, Oracle, PictureTest, Shows};
 use super::super::storage::Storage;
 
 /// A scene in the making.
@@ -19,7 +23,33 @@ pub(super) struct Setup {
     shows: Shows,
     triangles_at_a_time: Option<u32>,
     storage: Storage,
+    blocks: Option<(BlockSide, BlockLevels, BlockStyle)>,
     scene: Scene,
+}
+
+/// The levels of flat blocks.
+#[derive(Clone, Copy)]
+pub(super) enum BlockLevels {
+    /// All blocks have this one.
+    All(Level),
+    /// Random ones, from the finest to one sample.
+    Random,
+}
+
+impl BlockLevels {
+    fn of(self, layout: &BlockLayout) -> Vec<Level> {
+        let n_levels = u64::from(layout.side().one_sample().0) + 1;
+        let mut state = 0x9e37_79b9_7f4a_7c15u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            Level(((state >> 33) % n_levels) as u8)
+        };
+        let level = |_| match self {
+            BlockLevels::All(level) => level,
+            BlockLevels::Random => random(),
+        };
+        (0..layout.n_blocks_total()).map(level).collect()
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -45,6 +75,7 @@ impl Setup {
             shows: Shows::Something,
             triangles_at_a_time: None,
             storage: Storage::default(),
+            blocks: None,
             scene: Scene::new(camera, PICTURE, transfer),
             volume,
         }
@@ -70,6 +101,15 @@ impl Setup {
     pub(super) fn stored(self, storage: Storage) -> Setup {
         let oracle = if storage == Storage::Averages { OracleKind::EveryLevel } else { self.oracle };
         Setup { storage, oracle, ..self }
+    }
+
+    /// Draws flat blocks; the volume's own samples know of those at full resolution.
+    pub(super) fn blocks(self, side: BlockSide, levels: BlockLevels, style: BlockStyle) -> Setup {
+        let oracle = match levels {
+            BlockLevels::All(Level(0)) => self.oracle,
+            _ => OracleKind::None,
+        };
+        Setup { oracle, blocks: Some((side, levels, style)), ..self }
     }
 
     pub(super) fn rule(self, rule: QuadratureRule) -> Setup {
@@ -133,6 +173,11 @@ impl Setup {
     pub(super) fn build(self) -> PictureTest {
         let options = BuildOptions { side: self.side, downsampling: self.downsampling, max_bytes: None };
         let tree = build_tree(&self.volume, &options).expect("a case's octree fits");
+        let blocks = self.blocks.map(|(side, levels, style)| {
+            let volume = build_blocks(Arc::new(self.volume.clone()), &BlockOptions { side, ..BlockOptions::default() });
+            let volume = volume.expect("a case's blocks fit");
+            FlatBlocks { levels: levels.of(volume.layout()), volume, style }
+        });
         let volume = Box::new(self.volume);
         let oracle = match self.oracle {
             OracleKind::Volume => Oracle::Volume(volume),
@@ -140,7 +185,7 @@ impl Setup {
             OracleKind::None => Oracle::None,
         };
         let Setup { scene, shows, triangles_at_a_time, storage, .. } = self;
-        PictureTest { tree, scene, oracle, shows, triangles_at_a_time, storage }
+        PictureTest { tree, scene, oracle, shows, triangles_at_a_time, storage, blocks }
     }
 }
 

@@ -1,0 +1,355 @@
+//! From a scene and flat blocks to a frame plan.
+
+use std::sync::Arc;
+
+use brickfield_bricks::{BlockSource, FetchError, SourceId};
+use brickfield_core::glam::UVec3;
+use brickfield_core::{Aabb, BlockLayout, BlockSide, Level, Projection, TransferFunction, ValueRange};
+use brickfield_frame::{
+    BlockPlaces, BlockRow, BlockSamples, Chunk, Decode, Drawing, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice,
+    Join, Packing, Places, PlanError, PlanParts, Reach, SampleFormat, Slots,
+};
+use rayon::prelude::*;
+
+use crate::encode::encode;
+use crate::prepare::{Course, check_size, check_values, segment_reach, to_sample_space};
+use crate::{Copied, PrepareError, Scene, Skipping, Technique};
+
+/// How flat blocks are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BlockStyle {
+    /// How values between blocks come about: of the nearest block alone ([`Join::Shared`]), or blended.
+    pub join: Join,
+    /// What is drawn inside blocks that are transparent.
+    pub transparent: TransparentBlocks,
+}
+
+/// What is drawn inside a block all of whose voxels are transparent, next to one that is not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TransparentBlocks {
+    /// Nothing, as Ljung, Lundstroem and Ynnerman 2006 have it: the picture jumps at its faces where blended values are visible.
+    #[default]
+    Empty,
+    /// The blended values: only blocks are left out whose neighbours are transparent, too.
+    Blended,
+}
+
+/// Why flat blocks could not be prepared.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum PrepareBlocksError {
+    #[error(transparent)]
+    Prepare(#[from] PrepareError),
+    #[error("{n_levels} levels for {n_blocks} flat blocks")]
+    Levels { n_levels: usize, n_blocks: usize },
+    #[error("block ({}, {}, {}) at level {}; blocks of {side} voxels have levels up to {}", block.x, block.y, block.z, level.0, most.0)]
+    NoSuchLevel { block: UVec3, level: Level, side: BlockSide, most: Level },
+    #[error("{n_blocks} blocks; an index tells at most {limit} apart: take larger blocks")]
+    TooManyBlocks { n_blocks: usize, limit: u32 },
+    #[error(transparent)]
+    Fetch(#[from] FetchError),
+}
+
+impl From<PlanError> for PrepareBlocksError {
+    fn from(error: PlanError) -> PrepareBlocksError {
+        PrepareBlocksError::Prepare(error.into())
+    }
+}
+
+/// The flat blocks of the last frame, packed into one texture.
+///
+/// A frame that needs another level of a block fetches that block alone, and the others stay where they are. One residency serves
+/// one source at a time: handed another, it begins anew.
+#[derive(Debug, Default)]
+pub struct BlockResidency {
+    held: Option<Held>,
+    copied: Copied,
+}
+
+/// The blocks of a source, at some levels.
+#[derive(Debug)]
+struct Held {
+    source: SourceId,
+    packing: Packing,
+    rows: Vec<BlockRow>,
+    chunks: Vec<Option<Arc<Chunk>>>,
+    field: Option<Field>,
+}
+
+/// Texels along the sides of a texture, at most: every Vulkan device takes so many along x and y, and as many layers as rows tell
+/// apart.
+const MAX_TEXELS: u32 = 2048;
+/// Blocks are packed anew if their texture has this many times the cubes that they need, and a few more.
+const TOO_LARGE: u64 = 2;
+const FEW_CUBES: u64 = 8;
+
+/// The plan of a frame of flat blocks, each at a level of its own, by number. Criteria of the scene about levels are not asked.
+///
+/// # Errors
+/// As [`prepare`](crate::prepare()); levels that are no levels of the blocks; blocks that cannot be fetched. Then the residency is as before.
+pub fn prepare_blocks(
+    source: &dyn BlockSource,
+    scene: &Scene,
+    levels: &[Level],
+    style: BlockStyle,
+    residency: &mut BlockResidency,
+) -> Result<FramePlan, PrepareBlocksError> {
+    check_size(scene.size)?;
+    check_values(source.range())?;
+    check_levels(source.layout(), levels)?;
+    let coarsest = levels.iter().copied().max().unwrap_or(Level(0));
+    let Course { domain, sampling, rays } = Course::new(source.grid(), scene, coarsest)?;
+    residency.hold(source, levels)?;
+    let drawn = drawn_blocks(source, scene, style, &domain);
+    let field = residency.field(source, &drawn, style.join);
+    let drawing = match scene.technique {
+        Technique::RayCasting => Drawing::Rays,
+        Technique::Polygons(target) => {
+            Drawing::Polygons { back_to_front: back_to_front(source, scene, &drawn), target }
+        }
+    };
+    let parts = PlanParts::new(field, rays, domain, sampling, scene.transfer.clone());
+    Ok(FramePlan::new(PlanParts { drawing, ..parts })?)
+}
+
+fn check_levels(layout: &BlockLayout, levels: &[Level]) -> Result<(), PrepareBlocksError> {
+    let (n_levels, n_blocks, most) = (levels.len(), layout.n_blocks_total(), layout.side().one_sample());
+    if n_blocks >= IndexEntry::MAX_SLOTS as usize {
+        return Err(PrepareBlocksError::TooManyBlocks { n_blocks, limit: IndexEntry::MAX_SLOTS });
+    }
+    if n_levels != n_blocks {
+        return Err(PrepareBlocksError::Levels { n_levels, n_blocks });
+    }
+    match levels.iter().position(|level| *level > most) {
+        Some(i) => {
+            let (block, level, side) = (layout.block(i), levels[i], layout.side());
+            Err(PrepareBlocksError::NoSuchLevel { block, level, side, most })
+        }
+        None => Ok(()),
+    }
+}
+
+/// Whether something is drawn in each block.
+fn drawn_blocks(source: &dyn BlockSource, scene: &Scene, style: BlockStyle, domain: &Aabb) -> Vec<bool> {
+    let layout = source.layout();
+    if scene.skipping == Skipping::Off {
+        return vec![true; layout.n_blocks_total()];
+    }
+    let mut drawn = match (style.join, style.transparent) {
+        (Join::Blend(_), TransparentBlocks::Blended) => visible_with_neighbours(source, &scene.transfer),
+        _ => source.summaries().par_iter().map(|s| !scene.transfer.is_transparent(s.range)).collect(),
+    };
+    let reach = segment_reach(source.grid(), scene, layout.side().n_voxels());
+    if reach > 0 {
+        let range = |i: usize| f64::from(u8::from(drawn[i]));
+        drawn = over_neighbours(layout, reach, range, f64::max).into_iter().map(|any| any > 0.0).collect();
+    }
+    let is_in_domain = |block: UVec3| {
+        let low = layout.first_voxel(block);
+        let b = Aabb { min: low.as_dvec3(), max: (low + layout.extent(block)).as_dvec3() };
+        !to_sample_space(b).intersection(domain).is_empty()
+    };
+    drawn.iter_mut().zip(layout.blocks()).for_each(|(is_drawn, block)| *is_drawn &= is_in_domain(block));
+    drawn
+}
+
+/// Whether the transfer function shows something between the values of each block and its neighbours.
+fn visible_with_neighbours(source: &dyn BlockSource, transfer: &TransferFunction) -> Vec<bool> {
+    let (layout, summaries) = (source.layout(), source.summaries());
+    let min = over_neighbours(layout, 1, |i| summaries[i].range.min, f64::min);
+    let max = over_neighbours(layout, 1, |i| summaries[i].range.max, f64::max);
+    min.into_iter().zip(max).map(|(min, max)| !transfer.is_transparent(ValueRange { min, max })).collect()
+}
+
+/// For each block a number of it and the blocks within `reach` along each axis, one axis after the other.
+fn over_neighbours(
+    layout: &BlockLayout,
+    reach: u32,
+    number: impl Fn(usize) -> f64,
+    pick: impl Fn(f64, f64) -> f64,
+) -> Vec<f64> {
+    let n = layout.n_blocks();
+    let mut numbers: Vec<f64> = (0..layout.n_blocks_total()).map(number).collect();
+    for (axis, stride) in [1, n.x as usize, n.x as usize * n.y as usize].into_iter().enumerate() {
+        let before = numbers.clone();
+        for (i, to) in numbers.iter_mut().enumerate() {
+            let at = layout.block(i)[axis];
+            let (low, high) = (at.saturating_sub(reach), at.saturating_add(reach).min(n[axis] - 1));
+            *to = (low..=high).map(|k| before[i + k as usize * stride - at as usize * stride]).fold(*to, &pick);
+        }
+    }
+    numbers
+}
+
+/// The blocks that are drawn, the farthest first: along each axis by their distance from the eye.
+fn back_to_front(source: &dyn BlockSource, scene: &Scene, drawn: &[bool]) -> Vec<UVec3> {
+    let (layout, grid) = (source.layout(), source.grid());
+    let to_index = grid.world_to_index();
+    let side = f64::from(layout.side().n_voxels());
+    let eye = (to_index.transform_point3(scene.camera.eye()) / side).floor().as_ivec3();
+    let forward = to_index.transform_vector3(scene.camera.forward());
+    let distance = |block: UVec3| match scene.camera.projection() {
+        Projection::Perspective { .. } => (block.as_ivec3() - eye).abs().to_array(),
+        Projection::Orthographic { .. } => {
+            [0, 1, 2].map(|axis| if forward[axis] < 0.0 { -(block[axis] as i32) } else { block[axis] as i32 })
+        }
+    };
+    let mut blocks: Vec<UVec3> =
+        layout.blocks().zip(drawn).filter(|(_, is_drawn)| **is_drawn).map(|(b, _)| b).collect();
+    blocks.sort_by_key(|block| std::cmp::Reverse(distance(*block)));
+    blocks
+}
+
+impl BlockResidency {
+    /// The blocks whose samples the last frame fetched.
+    pub fn copied(&self) -> Copied {
+        self.copied
+    }
+
+    /// Texels of the texture that hold no sample.
+    pub fn n_free_texels(&self) -> u64 {
+        self.held.as_ref().map_or(0, |held| held.packing.n_free())
+    }
+
+    /// Fetches the blocks that have another level than before.
+    fn hold(&mut self, source: &dyn BlockSource, levels: &[Level]) -> Result<(), FetchError> {
+        self.copied = Copied::default();
+        let before = self.held.as_ref().filter(|held| held.source == source.id());
+        let is_new = |i: &usize| before.is_none_or(|held| held.rows[*i].level != levels[*i]);
+        let new: Vec<usize> = (0..levels.len()).filter(is_new).collect();
+        let coding = Coding::of(source);
+        let fetched: Vec<Vec<u8>> =
+            new.par_iter().map(|i| coding.fetch(source, *i, levels[*i])).collect::<Result<_, _>>()?;
+        self.copied = Copied { n_bricks: new.len(), n_bytes: fetched.iter().map(Vec::len).sum() };
+        let mut held = match self.held.take() {
+            Some(held) if held.source == source.id() => held,
+            _ => Held::empty(source, levels),
+        };
+        held.put(source.layout(), coding.format, &new, levels, fetched);
+        if held.is_too_large(source.layout()) {
+            held.pack_anew(source.layout());
+        }
+        self.held = Some(held);
+        Ok(())
+    }
+
+    /// The field of the held blocks, of which some are drawn.
+    fn field(&mut self, source: &dyn BlockSource, drawn: &[bool], join: Join) -> Field {
+        let held = self.held.as_mut().expect("blocks are held before they are a field");
+        let (layout, coding) = (*source.layout(), Coding::of(source));
+        let places = BlockPlaces::new(layout, held.packing.texels(), held.rows.clone());
+        let decode = coding.stored.rescaled(source.rescale());
+        let slots = Slots::new(coding.format, decode, Places::Blocks(places), held.chunks.clone());
+        let slots = slots.expect("blocks fill their places");
+        let entry = |(i, block): (usize, UVec3)| (block, IndexEntry::Resident { slot: i as u32, reach: Reach(0) });
+        let entries = layout.blocks().enumerate().filter(|(i, _)| drawn[*i]).map(entry);
+        let lattice = IndexLattice { cell_samples: layout.side().n_voxels(), origin: -0.5 };
+        let index = IndexGrid::new(layout.n_blocks(), lattice, entries);
+        let (index, slots) = match &held.field {
+            Some(before) => (index.following(before.index()), slots.following(before.slots())),
+            None => (index, slots),
+        };
+        let field = Field::new(layout.dims(), Arc::new(index), Arc::new(slots), join);
+        let field = field.expect("an index of the blocks' numbers");
+        held.field = Some(field.clone());
+        field
+    }
+}
+
+impl Held {
+    fn empty(source: &dyn BlockSource, levels: &[Level]) -> Held {
+        let (layout, side) = (source.layout(), source.layout().side());
+        let n_cubes = n_cubes(side, levels.iter().enumerate().map(|(i, level)| cube_level(layout, i, *level)));
+        let row = BlockRow { level: side.one_sample(), samples: BlockSamples::One(0.0) };
+        Held {
+            source: source.id(),
+            packing: Packing::new(side, n_cubes, MAX_TEXELS),
+            rows: vec![row; levels.len()],
+            chunks: vec![None; levels.len()],
+            field: None,
+        }
+    }
+
+    /// Puts blocks at new levels to places of their own.
+    fn put(
+        &mut self,
+        layout: &BlockLayout,
+        format: SampleFormat,
+        new: &[usize],
+        levels: &[Level],
+        fetched: Vec<Vec<u8>>,
+    ) {
+        for i in new {
+            if let BlockSamples::Texture(texel) = self.rows[*i].samples {
+                self.packing.give_back(cube_level(layout, *i, self.rows[*i].level), texel);
+            }
+        }
+        // The largest first: then none of them is cut for a smaller one while others wait.
+        let mut order: Vec<(usize, Vec<u8>)> = new.iter().copied().zip(fetched).collect();
+        order.sort_by_key(|(i, _)| cube_level(layout, *i, levels[*i]));
+        for (i, bytes) in order {
+            let samples = match bytes.len() == format.n_bytes() {
+                true => BlockSamples::One(format.read(&bytes, 0) as f32),
+                false => BlockSamples::Texture(self.packing.take(cube_level(layout, i, levels[i]))),
+            };
+            self.chunks[i] = matches!(samples, BlockSamples::Texture(_)).then(|| Arc::new(Chunk::new(bytes)));
+            self.rows[i] = BlockRow { level: levels[i], samples };
+        }
+    }
+
+    /// Cubes of a block's side that the blocks fill.
+    fn n_cubes(&self, layout: &BlockLayout) -> u64 {
+        let in_texture = (0..self.rows.len()).filter(|i| self.chunks[*i].is_some());
+        n_cubes(layout.side(), in_texture.map(|i| cube_level(layout, i, self.rows[i].level)))
+    }
+
+    fn is_too_large(&self, layout: &BlockLayout) -> bool {
+        let side = u64::from(layout.side().n_voxels());
+        let n_held = self.packing.texels().as_u64vec3().element_product() / side.pow(3);
+        n_held > TOO_LARGE * self.n_cubes(layout) + FEW_CUBES
+    }
+
+    /// Moves all blocks together. Each is another content, for its place is another.
+    fn pack_anew(&mut self, layout: &BlockLayout) {
+        self.packing = Packing::new(layout.side(), self.n_cubes(layout), MAX_TEXELS);
+        let mut order: Vec<usize> = (0..self.rows.len()).filter(|i| self.chunks[*i].is_some()).collect();
+        order.sort_by_key(|i| cube_level(layout, *i, self.rows[*i].level));
+        for i in order {
+            self.rows[i].samples = BlockSamples::Texture(self.packing.take(cube_level(layout, i, self.rows[i].level)));
+            self.chunks[i] = self.chunks[i].as_ref().map(|chunk| Arc::new(Chunk::new(chunk.bytes())));
+        }
+    }
+}
+
+/// Cubes of a block's side that cubes of some levels fill.
+fn n_cubes(side: BlockSide, levels: impl Iterator<Item = Level>) -> u64 {
+    let n_texels: u64 = levels.map(|level| u64::from(side.n_voxels() >> level.0).pow(3)).sum();
+    n_texels.div_ceil(u64::from(side.n_voxels()).pow(3))
+}
+
+/// The level of the least cube of texels that has room for a block: a short one may fit a smaller one.
+fn cube_level(layout: &BlockLayout, ordinal: usize, level: Level) -> Level {
+    let n = layout.n_samples(layout.block(ordinal), level).max_element().next_power_of_two();
+    Level((layout.side().n_voxels() / n).trailing_zeros() as u8)
+}
+
+/// How the samples of a source are held for a backend.
+struct Coding {
+    format: SampleFormat,
+    stored: Decode,
+}
+
+impl Coding {
+    fn of(source: &dyn BlockSource) -> Coding {
+        let range = source.rescale().stored_range(source.range());
+        let (format, stored) = SampleFormat::encoding(source.scalar_type(), range);
+        Coding { format, stored }
+    }
+
+    fn fetch(&self, source: &dyn BlockSource, ordinal: usize, level: Level) -> Result<Vec<u8>, FetchError> {
+        let mut bytes = Vec::new();
+        source.fetch(source.layout().block(ordinal), level, &mut bytes)?;
+        Ok(encode(bytes, source.scalar_type(), self.format, self.stored))
+    }
+}

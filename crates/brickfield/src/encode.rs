@@ -1,0 +1,35 @@
+//! From samples as they are stored to samples as a backend reads them.
+
+use brickfield_core::ScalarType;
+use brickfield_frame::{Decode, SampleFormat};
+
+/// Little-endian samples of a type in the form of [`SampleFormat::encoding`], which `decode` undoes.
+pub(crate) fn encode(mut bytes: Vec<u8>, scalar: ScalarType, format: SampleFormat, decode: Decode) -> Vec<u8> {
+    match scalar {
+        ScalarType::U8 | ScalarType::U16 => bytes,
+        ScalarType::I8 | ScalarType::I16 => {
+            // Two's complement with the top bit turned is the value shifted by half its range.
+            bytes.iter_mut().skip(scalar.n_bytes() - 1).step_by(scalar.n_bytes()).for_each(|high| *high ^= 0x80);
+            bytes
+        }
+        ScalarType::U32 => encode_f32(&bytes, format, decode, |b| f64::from(u32::from_le_bytes(b))),
+        ScalarType::I32 => encode_f32(&bytes, format, decode, |b| f64::from(i32::from_le_bytes(b))),
+        ScalarType::F32 => encode_f32(&bytes, format, decode, |b| f64::from(f32::from_le_bytes(b))),
+        ScalarType::F64 => encode_f32(&bytes, format, decode, f64::from_le_bytes),
+    }
+}
+
+fn encode_f32<const N: usize>(
+    bytes: &[u8],
+    format: SampleFormat,
+    decode: Decode,
+    number: impl Fn([u8; N]) -> f64,
+) -> Vec<u8> {
+    let (samples, _) = bytes.as_chunks::<N>();
+    let mut out = Vec::with_capacity(samples.len() * format.n_bytes());
+    for sample in samples {
+        let read = (number(*sample) - decode.offset) / decode.scale;
+        out.extend((read as f32).to_le_bytes());
+    }
+    out
+}
