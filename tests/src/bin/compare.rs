@@ -4,14 +4,13 @@ use std::process::ExitCode;
 
 use brickfield_conformance::compare::{CompareArgs, compare, parse, say, short_of};
 use brickfield_conformance::lamar::{LamarArgs, lamar};
+use brickfield_conformance::ljung::{LjungArgs, ljung};
 use brickfield_conformance::report::{Report, absences, table};
 use clap::Parser;
 
 fn main() -> ExitCode {
-    let is_paper =
-        |word: std::ffi::OsString| word.to_str().is_some_and(|w| w == "--paper" || w.starts_with("--paper="));
-    if std::env::args_os().skip(1).any(is_paper) {
-        return of_paper();
+    if let Some(paper) = paper_of_command_line() {
+        return of_paper(&paper);
     }
     let args = parse(std::env::args_os().collect()).unwrap_or_else(|e| e.exit());
     match compare(&args) {
@@ -23,15 +22,32 @@ fn main() -> ExitCode {
     }
 }
 
+/// What follows `--paper`; empty if nothing does.
+fn paper_of_command_line() -> Option<String> {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let at = words.iter().position(|word| word == "--paper" || word.starts_with("--paper="))?;
+    let word = words[at].strip_prefix("--paper=").map(str::to_owned);
+    Some(word.or_else(|| words.get(at + 1).cloned()).unwrap_or_default())
+}
+
 /// A paper's own comparisons, with options of their own.
-fn of_paper() -> ExitCode {
-    let args = LamarArgs::parse();
-    match lamar(&args) {
+fn of_paper(paper: &str) -> ExitCode {
+    let (found, check) = match paper {
+        "ljung" => {
+            let args = LjungArgs::parse();
+            (ljung(&args), args.common.check)
+        }
+        _ => {
+            let args = LamarArgs::parse();
+            (lamar(&args), args.common.check)
+        }
+    };
+    match found {
         Ok(findings) => {
             for missed in &findings.missed {
                 eprintln!("compare: missed: {}", missed.what);
             }
-            let fails = findings.missed.iter().any(|missed| args.check.contains(&missed.kind));
+            let fails = findings.missed.iter().any(|missed| check.contains(&missed.kind));
             ExitCode::from(if fails { 4 } else { 0 })
         }
         Err(e) => {

@@ -3,12 +3,13 @@
 use brickfield::bricks::Downsampling;
 use brickfield_core::BrickSide;
 
+use super::LamarArgs;
 use super::measure::{answer, distance};
 use super::scenes::{data_sets, geometries, scene, tree, views};
-use super::{LamarArgs, LamarError, Missed, print};
+use crate::paper::{Missed, PaperError, print};
 use crate::turns::Contestant;
 
-pub(super) fn run(args: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
+pub(super) fn run(args: &LamarArgs) -> Result<Vec<Missed>, PaperError> {
     print("Bricks of 16, ray caster on the cpu, errors against the continuous integral at full resolution.\n")?;
     print("data               view      RMSE: subsampled  averaged   colour difference: subsampled  averaged  better")?;
     let mut cpu = brickfield::cpu::CpuBackend::new();
@@ -19,7 +20,7 @@ pub(super) fn run(args: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
             [Downsampling::Subsample, Downsampling::Average].map(|how| tree(&data_set.volume, BrickSide::S16, how));
         let [subsampled, averaged] = trees;
         let trees = [subsampled?, averaged?];
-        for (view, camera) in views(&data_set, args.size)? {
+        for (view, camera) in views(&data_set, args.common.size)? {
             let scene = scene(args, &data_set.transfer, camera, geometries(args)[3], &args.detail);
             let answer = answer(&data_set.volume, &scene);
             let mut errors = Vec::new();

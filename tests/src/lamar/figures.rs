@@ -4,23 +4,23 @@ use brickfield::bricks::{BrickTree, Downsampling};
 use brickfield::frame::{Backend, Lengths};
 use brickfield::lod::Criterion;
 use brickfield::overlay::{show_bricks, show_camera};
-use brickfield::{Residency, Scene, Viewpoint, prepare, write_exr, write_png};
+use brickfield::{Residency, Scene, Viewpoint, prepare};
 use brickfield_core::glam::UVec2;
 use brickfield_core::{BrickId, BrickSide, Camera, Image};
 
+use super::LamarArgs;
 use super::scenes::{DataSet, Geometry, data_sets, geometries, geometries_of, scene, tree, views};
 use super::seams::{camera as cube_camera, cube};
-use super::{LamarArgs, LamarError, Missed, print};
 use crate::compare::rivals::Rivals;
+use crate::paper::panels::{beside, stacked};
+use crate::paper::{Missed, PaperError};
 
-/// Behind transparent pixels.
-const BACKGROUND: [f64; 3] = [0.02, 0.02, 0.025];
 /// Bricks' side in figure 14: the paper's.
 const SIDE: BrickSide = BrickSide::S16;
 
-pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, LamarError> {
+pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, PaperError> {
     // For looking, larger than for timing.
-    let args = &LamarArgs { size: args.size * 2, ..args.clone() };
+    let args = &args.with(|common| common.size *= 2);
     // The last is a rasteriser, if there is one.
     let Some(backend) = rivals.present.last_mut() else { return Ok(Vec::new()) };
     figure_8(args, backend.as_mut())?;
@@ -31,7 +31,7 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
 }
 
 /// The constant cube, its bricks of several levels: each geometry without correction, with it, and the difference.
-fn figure_8(args: &LamarArgs, backend: &mut dyn Backend) -> Result<(), LamarError> {
+fn figure_8(args: &LamarArgs, backend: &mut dyn Backend) -> Result<(), PaperError> {
     let (volume, fog) = cube();
     let tree = tree(&volume, SIDE, Downsampling::Subsample)?;
     let detail = [Criterion::Distance { factor: 1.5 }];
@@ -46,31 +46,31 @@ fn figure_8(args: &LamarArgs, backend: &mut dyn Backend) -> Result<(), LamarErro
         rows[1].push(truth);
     }
     let what = "object planes, viewport planes, shells; uncorrected, corrected, the opacity that is missing (blue) or too much (red), full at 1/4";
-    write(args, "figure8", &stacked(&rows.map(|row| beside(&row))), what)
+    args.common.write_picture("figure8", &stacked(&rows.map(|row| beside(&row))), what)
 }
 
 /// From the surface and from inside: the bricks and the picture, with fixed tiles and with multiresolution.
-fn figure_14(args: &LamarArgs, backend: &mut dyn Backend, data_set: &DataSet) -> Result<(), LamarError> {
+fn figure_14(args: &LamarArgs, backend: &mut dyn Backend, data_set: &DataSet) -> Result<(), PaperError> {
     let tree = tree(&data_set.volume, SIDE, Downsampling::Subsample)?;
     // Beside the line of the views, so that cameras are seen from their sides.
     let overview: Viewpoint = "from=-1,-0.4,0.5 zoom=0.8".parse().expect("a viewpoint");
-    let overview = overview.camera(data_set.volume.grid(), data_set.frame, args.size)?;
+    let overview = overview.camera(data_set.volume.grid(), data_set.frame, args.common.size)?;
     let mut rows = Vec::new();
-    for (_, camera) in views(data_set, args.size)?.into_iter().skip(1) {
+    for (_, camera) in views(data_set, args.common.size)?.into_iter().skip(1) {
         let mut panels = Vec::new();
         // Distances of the paper's own factor.
         for criterion in [Criterion::FullResolution, Criterion::Distance { factor: 1.0 }] {
             let detail = [criterion];
             let scene = scene(args, &data_set.transfer, camera, geometries(args)[3], &detail);
             let (picture, bricks) = render(&tree, &scene, backend)?;
-            panels.extend([boxes(&tree, &overview, &camera, &bricks, args.size), picture]);
+            panels.extend([boxes(&tree, &overview, &camera, &bricks, args.common.size), picture]);
         }
         rows.push(beside(&panels));
     }
     let name =
         data_set.name.rsplit('/').next().unwrap_or(&data_set.name).split('.').next().unwrap_or_default().to_owned();
     let what = "from the surface, from inside; fixed tiles and their picture, multiresolution and its picture";
-    write(args, &format!("figure14-{name}"), &stacked(&rows), what)
+    args.common.write_picture(&format!("figure14-{name}"), &stacked(&rows), what)
 }
 
 /// Without a rasteriser the same samples, by rays.
@@ -85,11 +85,11 @@ fn render(
     tree: &BrickTree,
     scene: &Scene,
     backend: &mut dyn Backend,
-) -> Result<(Image<f32>, Vec<BrickId>), LamarError> {
+) -> Result<(Image<f32>, Vec<BrickId>), PaperError> {
     let mut residency = Residency::default();
     let plan = prepare(tree, scene, &mut residency)?;
     let name = backend.describe().backend;
-    let frame = backend.render(&plan).map_err(|source| LamarError::Render { backend: name, source })?;
+    let frame = backend.render(&plan).map_err(|source| PaperError::Render { backend: name, source })?;
     Ok((frame.image, residency.bricks().to_vec()))
 }
 
@@ -111,73 +111,4 @@ fn difference(a: &Image<f32>, b: &Image<f32>) -> Image<f32> {
         *to = if more < 0.0 { [rest, rest, 1.0, 1.0] } else { [1.0, rest, rest, 1.0] };
     }
     out
-}
-
-/// Pictures of one height, side by side, a few pixels apart.
-fn beside(images: &[Image<f32>]) -> Image<f32> {
-    joined(
-        images,
-        |at, size| UVec2::new(at.x + size.x + GAP, 0),
-        |at, size| UVec2::new(at.x + size.x, size.y.max(at.y)),
-    )
-}
-
-/// Pictures of one width, from top to bottom.
-fn stacked(images: &[Image<f32>]) -> Image<f32> {
-    joined(
-        images,
-        |at, size| UVec2::new(0, at.y + size.y + GAP),
-        |at, size| UVec2::new(size.x.max(at.x), at.y + size.y),
-    )
-}
-
-/// Pixels between panels.
-const GAP: u32 = 4;
-
-fn joined(
-    images: &[Image<f32>],
-    next: impl Fn(UVec2, UVec2) -> UVec2,
-    end: impl Fn(UVec2, UVec2) -> UVec2,
-) -> Image<f32> {
-    let mut corner = UVec2::ZERO;
-    let corners: Vec<UVec2> = images
-        .iter()
-        .map(|image| {
-            let own = corner;
-            corner = next(own, image.size());
-            own
-        })
-        .collect();
-    let size = images.iter().zip(&corners).fold(UVec2::ZERO, |size, (image, at)| size.max(end(*at, image.size())));
-    let mut out = Image::transparent(size);
-    for (image, at) in images.iter().zip(corners) {
-        for (y, row) in image.pixels().chunks_exact(image.size().x.max(1) as usize).enumerate() {
-            let start = at.x as usize + size.x as usize * (at.y as usize + y);
-            out.pixels_mut()[start..start + row.len()].copy_from_slice(row);
-        }
-    }
-    out
-}
-
-fn write(args: &LamarArgs, name: &str, image: &Image<f32>, what: &str) -> Result<(), LamarError> {
-    write_exr(&args.out.join(format!("{name}.exr")), image, &[("figure", what.to_owned())])?;
-    let path = args.out.join(format!("{name}.png"));
-    write_png(&path, image, BACKGROUND)?;
-    print(&format!("{}: {what}", path.display()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn panels_lie_beside_and_below_each_other() {
-        let image = |value: f32| Image::new(UVec2::new(3, 2), vec![[value; 4]; 6]).unwrap();
-        let row = beside(&[image(0.25), image(0.5)]);
-        assert_eq!(row.size(), UVec2::new(6 + GAP, 2));
-        assert_eq!((row.pixels()[2][0], row.pixels()[3][0], row.pixels()[3 + GAP as usize][0]), (0.25, 0.0, 0.5));
-        let all = stacked(&[row.clone(), row]);
-        assert_eq!(all.size(), UVec2::new(6 + GAP, 4 + GAP));
-        assert_eq!(all.pixels().last(), Some(&[0.5; 4]));
-    }
 }

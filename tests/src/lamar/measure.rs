@@ -8,9 +8,9 @@ use brickfield_core::glam::DVec3;
 use brickfield_core::{Aabb, Image, Volume};
 use serde::Serialize;
 
-use super::LamarError;
 use crate::conformance::Tolerance;
 use crate::metrics::{delta_e, errors};
+use crate::paper::PaperError;
 use crate::turns::{Contestant, Ratio, Spread, TimedFrame, take_turns};
 
 /// The bricks and polygons of a frame. Frames of one scene, one of them of level 0 alone, draw the same bricks if these are equal.
@@ -39,7 +39,7 @@ pub(super) fn answer(volume: &Volume, scene: &Scene) -> Image<f64> {
 }
 
 /// The sum that the scene's cut asks for in f64, with nothing culled and nothing left out.
-pub(super) fn reference(tree: &BrickTree, scene: &Scene) -> Result<Discrete, LamarError> {
+pub(super) fn reference(tree: &BrickTree, scene: &Scene) -> Result<Discrete, PaperError> {
     let complete = Scene { skipping: Skipping::Off, technique: Technique::RayCasting, ..scene.clone() };
     Ok(discrete(&prepare(tree, &complete, &mut Residency::default())?))
 }
@@ -68,10 +68,10 @@ pub(super) fn duel(
     scenes: &[Scene; 2],
     backend: &mut dyn Backend,
     n_rounds: u32,
-) -> Result<Duel, LamarError> {
+) -> Result<Duel, PaperError> {
     let mut contestants = scenes.each_ref().map(|scene| Contestant::new(tree, scene.clone()));
     let (mut latest, mut prepare_ms) = ([None, None], [Vec::new(), Vec::new()]);
-    let ms = take_turns::<LamarError>(2, n_rounds, |turn| {
+    let ms = take_turns::<PaperError>(2, n_rounds, |turn| {
         let frame = contestants[turn.contestant].take(turn, backend)?;
         if !turn.warm_up {
             prepare_ms[turn.contestant].push(frame.prepare_ms);
@@ -108,7 +108,7 @@ pub(super) struct Judge {
 
 impl Judge {
     /// For a scene in exact mode, of which the rule is the same on every device.
-    pub(super) fn new(tree: &BrickTree, scene: &Scene, backend: &dyn Backend) -> Result<Judge, LamarError> {
+    pub(super) fn new(tree: &BrickTree, scene: &Scene, backend: &dyn Backend) -> Result<Judge, PaperError> {
         let reference = reference(tree, scene)?;
         let plan = prepare(tree, scene, &mut Residency::default())?;
         let tolerance = Tolerance::of(&plan, &reference, &backend.describe().capabilities)?;
@@ -121,7 +121,7 @@ impl Judge {
     }
 }
 
-pub(super) fn distance(image: &Image<f32>, answer: &Image<f64>) -> Result<Distance, LamarError> {
+pub(super) fn distance(image: &Image<f32>, answer: &Image<f64>) -> Result<Distance, PaperError> {
     let e = errors(image, answer)?;
     let delta_e_mean = delta_e(image, answer, [0.0; 3])?.mean;
     Ok(Distance { rmse: e.rmse, max: e.worst.difference, delta_e_mean })

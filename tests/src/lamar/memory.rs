@@ -3,10 +3,11 @@
 use brickfield::bricks::tree_memory;
 use brickfield_core::{BrickLayout, Level};
 
+use super::LamarArgs;
 use super::scenes::{data_sets, sides};
-use super::{LamarArgs, LamarError, Missed, print};
+use crate::paper::{Missed, PaperError, print};
 
-pub(super) fn run(args: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
+pub(super) fn run(args: &LamarArgs) -> Result<Vec<Missed>, PaperError> {
     print(
         "The formula: of a brick's n^3 voxels, n^3 - (n - 1)^3 are shared. Stored: level 0 in whole bricks; with the coarser\n\
            levels; of what is stored, voxels once, again in a neighbour, and beyond the volume's border.\n",

@@ -11,7 +11,8 @@ use brickfield::{Scene, Technique, Viewpoint};
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{BrickSide, Camera, Grid, IndexPos, Projection, Ray, TransferFunction, Volume, WorldPos};
 
-use super::{LamarArgs, LamarError, Part};
+use super::{LamarArgs, Part};
+use crate::paper::PaperError;
 
 /// The data sets, as paths below the folder of real volumes.
 const DATA: [&str; 3] = ["ct/engine.vti", "ct/aneurism.vti", "ct/LIDC2.mha"];
@@ -33,41 +34,16 @@ pub(super) struct Geometry {
 }
 
 /// Whether the data that the parts need are there, and the text of `--only` is in one of their paths.
-pub(super) fn check_data(args: &LamarArgs) -> Result<(), LamarError> {
-    let are_named = args.only.is_some() || !args.files.is_empty();
-    if !are_named && !args.parts().into_iter().any(Part::needs_data) {
-        return Ok(());
-    }
-    match named(args)?.into_iter().find(|(_, path)| !path.exists()) {
-        Some((_, path)) => Err(LamarError::NoVolume { path }),
-        None => Ok(()),
-    }
+pub(super) fn check_data(args: &LamarArgs) -> Result<(), PaperError> {
+    args.common.check_data(&DATA, args.parts().into_iter().any(Part::needs_data))
 }
 
 /// The volumes that are asked for, one by one.
-pub(super) fn data_sets(args: &LamarArgs) -> Result<impl Iterator<Item = Result<DataSet, LamarError>>, LamarError> {
-    Ok(named(args)?.into_iter().map(|(name, path)| data_set(name, &path)))
+pub(super) fn data_sets(args: &LamarArgs) -> Result<impl Iterator<Item = Result<DataSet, PaperError>>, PaperError> {
+    Ok(args.common.named(&DATA)?.into_iter().map(|(name, path)| data_set(name, &path)))
 }
 
-/// The volumes that are asked for: their names in the tables, and their paths.
-fn named(args: &LamarArgs) -> Result<Vec<(String, PathBuf)>, LamarError> {
-    if !args.files.is_empty() {
-        let name = |path: &PathBuf| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-        return Ok(args.files.iter().map(|path| (name(path), path.clone())).collect());
-    }
-    let folder = args.data.as_ref().ok_or(LamarError::NoData)?;
-    if !folder.is_dir() {
-        return Err(LamarError::NoFolder { path: folder.clone() });
-    }
-    let wanted = |path: &&str| args.only.as_ref().is_none_or(|text| path.contains(text.as_str()));
-    let sets: Vec<_> = DATA.into_iter().filter(wanted).map(|path| (path.to_owned(), folder.join(path))).collect();
-    match sets.is_empty() {
-        true => Err(LamarError::NoSuchData { only: args.only.clone().unwrap_or_default(), known: DATA.join(", ") }),
-        false => Ok(sets),
-    }
-}
-
-fn data_set(name: String, path: &Path) -> Result<DataSet, LamarError> {
+fn data_set(name: String, path: &Path) -> Result<DataSet, PaperError> {
     let opened = open(path, &OpenOptions::default())?;
     let transfer = automatic(&opened.volume);
     Ok(DataSet { name, transfer, frame: opened.frame, volume: opened.volume })
@@ -79,12 +55,12 @@ pub(super) fn sides(args: &LamarArgs) -> Vec<BrickSide> {
     BrickSide::ALL.into_iter().filter(wanted).collect()
 }
 
-pub(super) fn tree(volume: &Volume, side: BrickSide, downsampling: Downsampling) -> Result<BrickTree, LamarError> {
+pub(super) fn tree(volume: &Volume, side: BrickSide, downsampling: Downsampling) -> Result<BrickTree, PaperError> {
     Ok(build_tree(volume, &BuildOptions { side, downsampling, max_bytes: None })?)
 }
 
 /// Three views along one line: from outside, from the box's surface, and from half-way to its centre.
-pub(super) fn views(data_set: &DataSet, size: UVec2) -> Result<[(&'static str, Camera); 3], LamarError> {
+pub(super) fn views(data_set: &DataSet, size: UVec2) -> Result<[(&'static str, Camera); 3], PaperError> {
     let grid = data_set.volume.grid();
     let outside = Viewpoint::default().camera(grid, data_set.frame, size)?;
     let center = grid.world_box().center();
@@ -133,11 +109,11 @@ pub(super) fn scene(
     detail: &[Criterion],
 ) -> Scene {
     Scene {
-        step_voxels: args.step,
+        step_voxels: args.common.step,
         placement: geometry.placement,
         technique: geometry.technique,
         division: Division::Brick,
         detail: detail.to_vec(),
-        ..Scene::new(camera, args.size, transfer.clone())
+        ..Scene::new(camera, args.common.size, transfer.clone())
     }
 }

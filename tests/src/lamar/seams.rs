@@ -9,10 +9,11 @@ use brickfield::{Residency, Scene, prepare, prepare_selection};
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickId, BrickSide, Camera, Grid, Image, Optics, Projection, TransferFunction, Volume};
 
+use super::LamarArgs;
 use super::scenes::{Geometry, geometries, geometries_of, rasterises, scene, tree};
-use super::{LamarArgs, LamarError, Missed, print};
 use crate::compare::rivals::Rivals;
 use crate::metrics::errors;
+use crate::paper::{Missed, PaperError, print};
 
 /// Voxels along the cube's side.
 const SIDE: u32 = 96;
@@ -31,13 +32,13 @@ pub(super) fn cube() -> (Volume, TransferFunction) {
 }
 
 /// The camera of figure 8: near, so that perspective is strong.
-pub(super) fn camera() -> Result<Camera, LamarError> {
+pub(super) fn camera() -> Result<Camera, PaperError> {
     let center = DVec3::splat(0.5 * f64::from(SIDE));
     let eye = center + DVec3::new(0.75, -1.0, 0.6) * f64::from(SIDE);
     Ok(Camera::look_at(eye, center, DVec3::Z, Projection::Perspective { fov_y: 80f64.to_radians() })?)
 }
 
-pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, LamarError> {
+pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, PaperError> {
     let (volume, fog) = cube();
     let tree = tree(&volume, BrickSide::S16, Downsampling::Subsample)?;
     let mut missed = seams(args, rivals, &tree, &fog)?;
@@ -52,7 +53,7 @@ fn seams(
     rivals: &mut Rivals,
     tree: &BrickTree,
     fog: &TransferFunction,
-) -> Result<Vec<Missed>, LamarError> {
+) -> Result<Vec<Missed>, PaperError> {
     let cuts: Vec<Selection> = (0..N_CUTS).map(|number| random_cut(tree, number)).collect();
     let [levels, bricks] = [&n_levels as &dyn Fn(&Selection) -> usize, &|cut| cut.drawn().count()].map(|count| {
         let counts = || cuts.iter().map(count);
@@ -104,7 +105,7 @@ fn figure_8(
     rivals: &mut Rivals,
     tree: &BrickTree,
     fog: &TransferFunction,
-) -> Result<Vec<Missed>, LamarError> {
+) -> Result<Vec<Missed>, PaperError> {
     print(
         "\nWithout correction (figure 8): optical depth over the true one, of pixels behind at least 50 voxels; 1 is right, below it is too\n\
          transparent. Mean in the middle third of the picture and outside of it; least and greatest; one level, then several.\n",
@@ -136,7 +137,7 @@ fn angles(
     rivals: &mut Rivals,
     tree: &BrickTree,
     fog: &TransferFunction,
-) -> Result<Vec<Missed>, LamarError> {
+) -> Result<Vec<Missed>, PaperError> {
     print(
         "\nObject-aligned planes without correction, parallel rays turned about z: depth over the true one, and the cosine:\n",
     )?;
@@ -208,14 +209,14 @@ fn render(
     scene: &Scene,
     cut: Option<&Selection>,
     backend: &mut dyn Backend,
-) -> Result<Image<f32>, LamarError> {
+) -> Result<Image<f32>, PaperError> {
     let mut residency = Residency::default();
     let plan = match cut {
         Some(cut) => prepare_selection(tree, scene, cut, &mut residency)?,
         None => prepare(tree, scene, &mut residency)?,
     };
     let name = backend.describe().backend;
-    Ok(backend.render(&plan).map_err(|source| LamarError::Render { backend: name, source })?.image)
+    Ok(backend.render(&plan).map_err(|source| PaperError::Render { backend: name, source })?.image)
 }
 
 /// The picture of the cube as its extinction and the rays' ways through it say.

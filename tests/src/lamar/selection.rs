@@ -6,11 +6,12 @@ use brickfield::lod::{Criterion, Culling, Selection, View, select_cut};
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickLayout, BrickSide, Camera, Grid, Projection, WorldPos};
 
-use super::{LamarArgs, LamarError, Missed, print};
+use super::LamarArgs;
+use crate::paper::{Missed, PaperError, print};
 
 const SIDE: BrickSide = BrickSide::S16;
 
-pub(super) fn run(_: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
+pub(super) fn run(_: &LamarArgs) -> Result<Vec<Missed>, PaperError> {
     print(
         "Figure 4: eight tiles in four levels; a tile is drawn if the point is farther from its centre than its width.\n\
            Tiles of each level, finest first, by the place of the point in tiles:\n",
@@ -49,7 +50,7 @@ pub(super) fn run(_: &LamarArgs) -> Result<Vec<Missed>, LamarError> {
 }
 
 /// The tiles for a point of interest, in tiles from the first sample.
-fn select(n_tiles: UVec3, point: DVec3) -> Result<Selection, LamarError> {
+fn select(n_tiles: UVec3, point: DVec3) -> Result<Selection, PaperError> {
     let dims = n_tiles * SIDE.n_cells() + 1;
     let grid = Grid::axis_aligned(dims, DVec3::ONE).expect("a plain grid");
     let at = point * f64::from(SIDE.n_cells()) + 0.5;

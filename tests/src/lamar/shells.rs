@@ -6,12 +6,13 @@ use brickfield::lod::Criterion;
 use brickfield::{Residency, Technique, prepare};
 use brickfield_core::{BrickSide, Image};
 
+use super::LamarArgs;
 use super::measure::reference;
 use super::scenes::{geometries, rasterises, scene, tree};
-use super::{LamarArgs, LamarError, Missed, print};
 use crate::compare::rivals::Rivals;
 use crate::metrics::errors;
 use crate::orders::OrderRow;
+use crate::paper::{Missed, PaperError, print};
 use crate::volumes::phantom;
 
 /// Facets' sides, in pixels: the coarsest are a sixth of the picture.
@@ -21,8 +22,8 @@ const FLOOR: f64 = 1e-6;
 /// Pictures of this side.
 const SIZE: u32 = 384;
 
-pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, LamarError> {
-    let args = LamarArgs { size: brickfield_core::glam::UVec2::splat(SIZE), step: 4.0, ..args.clone() };
+pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, PaperError> {
+    let args = args.with(|common| (common.size, common.step) = (UVec2::splat(SIZE), 4.0));
     print(&format!(
         "The phantom, {SIZE} x {SIZE} pixels, steps of 4 voxels so that surfaces show, several levels. RMSE of rasterised shells against\n\
          the f64 sum over spherical ones, by pixels along a facet's side; facets lie inside their sphere by the square of their size.\n"
@@ -40,7 +41,7 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
             scene.placement = Placement::TessellatedShells { facet_pixels };
             scene.technique = Technique::Polygons(Target::Float32);
             let plan = prepare(&tree, &scene, &mut Residency::default())?;
-            let image = backend.render(&plan).map_err(|source| LamarError::Render { backend: name, source })?.image;
+            let image = backend.render(&plan).map_err(|source| PaperError::Render { backend: name, source })?.image;
             found.push((f64::from(facet_pixels), errors(&image, &answer)?.rmse));
         }
         let words: Vec<String> = found.iter().map(|(side, e)| format!("{side}: {e:.2e}")).collect();

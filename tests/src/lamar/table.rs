@@ -7,10 +7,11 @@ use brickfield::lod::Criterion;
 use brickfield_core::{Camera, Image};
 use serde::Serialize;
 
+use super::LamarArgs;
 use super::measure::{Distance, Drawn, Judge, SceneTimes, answer, distance, duel};
 use super::scenes::{DataSet, Geometry, data_sets, geometries, geometries_of, scene, sides, tree, views};
-use super::{LamarArgs, LamarError, Missed, print, write_rows};
 use crate::compare::rivals::Rivals;
+use crate::paper::{Missed, PaperError, print};
 use crate::turns::{Bound, Claim, Claims, Ratio, Spread, Standing};
 
 /// A line of the table: one data set, view, tile size, geometry and backend.
@@ -50,19 +51,19 @@ struct Seat<'a> {
     answer: &'a Image<f64>,
 }
 
-pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, LamarError> {
+pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, PaperError> {
     print(&format!(
         "{} x {} pixels, steps of {} voxel(s) of level 0, 2^level of them in coarser bricks (subsampled); times are medians of {} rounds in which both took turns,\n\
          from the scene to the picture (selection, order and polygons included, bricks resident); the ratio is the median of the rounds' ratios, with the interval that\n\
          holds the true one and its confidence; \"undecided\": the interval holds 1, or has less than 95 %. Errors are against the continuous integral at full resolution;\n\
          \"ok\": within the rule of the f64 sum of the same cut, nothing culled.\n",
-        args.size.x, args.size.y, args.step, args.frames
+        args.common.size.x, args.common.size.y, args.common.step, args.common.frames
     ))?;
     print(HEADER)?;
     let mut rows = Vec::new();
     for data_set in data_sets(args)? {
         let data_set = data_set?;
-        let views = views(&data_set, args.size)?;
+        let views = views(&data_set, args.common.size)?;
         let full = geometries(args)[3];
         let answers =
             views.map(|(_, camera)| answer(&data_set.volume, &scene(args, &data_set.transfer, camera, full, &[])));
@@ -74,10 +75,10 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
             }
         }
     }
-    write_rows(args, "table.json", &rows)?;
+    args.common.write_rows("table.json", &rows)?;
     let claims = claims(&rows);
     print(&format!("\n{}", Claims(&claims)))?;
-    write_rows(args, "table-claims.json", &claims)?;
+    args.common.write_rows("table-claims.json", &claims)?;
     Ok(missed(&rows, &claims))
 }
 
@@ -85,7 +86,7 @@ const HEADER: &str = "\
 data               view     side  tiles: fixed multi  geometry        backend  fixed ms (min to max)      multi ms (min to max)      fixed / multi              multi is   \
 RMSE: fixed    multi  max: fixed    multi  as the cut says";
 
-fn of_seat(args: &LamarArgs, rivals: &mut Rivals, seat: &Seat<'_>) -> Result<Vec<TableRow>, LamarError> {
+fn of_seat(args: &LamarArgs, rivals: &mut Rivals, seat: &Seat<'_>) -> Result<Vec<TableRow>, PaperError> {
     let mut rows = Vec::new();
     for geometry in geometries(args) {
         let with = |detail: &[Criterion]| scene(args, &seat.data_set.transfer, seat.camera, geometry, detail);
@@ -110,9 +111,9 @@ fn contest(
     seat: &Seat<'_>,
     geometry: Geometry,
     (scenes, judges): (&[Scene; 2], &[Judge; 2]),
-) -> Result<TableRow, LamarError> {
-    let duel = duel(seat.tree, scenes, backend, args.frames)?;
-    let tiling = |times: SceneTimes, judge: &Judge| -> Result<Tiling, LamarError> {
+) -> Result<TableRow, PaperError> {
+    let duel = duel(seat.tree, scenes, backend, args.common.frames)?;
+    let tiling = |times: SceneTimes, judge: &Judge| -> Result<Tiling, PaperError> {
         let (error, complaint) = (distance(&times.image, seat.answer)?, judge.complaint(&times.image));
         let SceneTimes { drawn, ms, prepare_ms, .. } = times;
         Ok(Tiling { drawn, ms, prepare_ms, error, complaint })

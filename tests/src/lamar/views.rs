@@ -8,10 +8,11 @@ use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{BrickSide, Camera, Grid, Projection, ScalarType};
 use serde::Serialize;
 
+use super::LamarArgs;
 use super::measure::{Distance, Drawn, Judge, distance, duel};
 use super::scenes::{geometries, scene, tree};
-use super::{LamarArgs, LamarError, Missed, print, write_rows};
 use crate::compare::rivals::Rivals;
+use crate::paper::{Missed, PaperError, print};
 use crate::turns::{Bound, Claim, Claims, Ratio, Spread};
 use crate::volumes::{Phantom, phantom_of};
 
@@ -28,13 +29,13 @@ struct ViewRow {
     complaint: Option<String>,
 }
 
-pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, LamarError> {
+pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, PaperError> {
     let Phantom { volume, transfer, .. } = phantom_of(UVec3::splat(args.volume_side), ScalarType::U8);
     let tree = tree(&volume, BrickSide::S32, Downsampling::Subsample)?;
     print(&format!(
         "The phantom at {}^3, {} views, {} x {} pixels, ray caster, steps of {} voxel(s) times 2^level, bricks of 32. Errors are against\n\
          the same backend's picture at full resolution; \"ok\": within the rule of the f64 sum of the same cut, nothing culled.\n",
-        args.volume_side, args.views, args.size.x, args.size.y, args.step
+        args.volume_side, args.views, args.common.size.x, args.common.size.y, args.common.step
     ))?;
     print(
         "view  backend  bricks: full   1 px     MB: full   1 px    ms: full    1 px  ratio   max        RMSE       colour difference: mean  as the cut says",
@@ -52,12 +53,12 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
             rows.push(row);
         }
     }
-    write_rows(args, "views.json", &rows)?;
+    args.common.write_rows("views.json", &rows)?;
     summary(args, &rows)
 }
 
 /// On a spiral around the volume, every fourth view from inside.
-fn camera(grid: &Grid, view: u32, n: u32) -> Result<Camera, LamarError> {
+fn camera(grid: &Grid, view: u32, n: u32) -> Result<Camera, PaperError> {
     let b = grid.world_box();
     let height = 1.0 - 2.0 * (f64::from(view) + 0.5) / f64::from(n);
     let angle = f64::from(view) * std::f64::consts::PI * (3.0 - 5f64.sqrt());
@@ -75,8 +76,8 @@ fn of_view(
     tree: &BrickTree,
     view: u32,
     (scenes, judge): (&[Scene; 2], &Judge),
-) -> Result<ViewRow, LamarError> {
-    let duel = duel(tree, scenes, backend, args.frames)?;
+) -> Result<ViewRow, PaperError> {
+    let duel = duel(tree, scenes, backend, args.common.frames)?;
     let (full, pixel) = (duel.first, duel.second);
     Ok(ViewRow {
         view,
@@ -112,7 +113,7 @@ fn line(row: &ViewRow) -> String {
 
 /// Medians over the views, and the claims that do not hold. The claim about times is about the median over views: no
 /// row is decided by itself.
-fn summary(args: &LamarArgs, rows: &[ViewRow]) -> Result<Vec<Missed>, LamarError> {
+fn summary(args: &LamarArgs, rows: &[ViewRow]) -> Result<Vec<Missed>, PaperError> {
     let more = |r: &&ViewRow| r.pixel.0.n_bricks > r.full.0.n_bricks;
     let more = rows
         .iter()
@@ -143,7 +144,7 @@ fn summary(args: &LamarArgs, rows: &[ViewRow]) -> Result<Vec<Missed>, LamarError
         claims.push(Claim::of_ratio(format!("views, {name}: full resolution / one pixel"), time, Bound::Above(1.0)));
     }
     print(&format!("\n{}", Claims(&claims)))?;
-    write_rows(args, "views-claims.json", &claims)?;
+    args.common.write_rows("views-claims.json", &claims)?;
     missed.extend(claims.iter().filter_map(Missed::of_claim));
     Ok(missed)
 }

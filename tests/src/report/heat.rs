@@ -10,7 +10,12 @@ const STOPS: [[u8; 3]; 7] =
 /// The colour (8-bit sRGB) of a difference; below and above [`HEAT_RANGE`] the scale's ends.
 pub fn heat(difference: f64) -> [u8; 3] {
     let [low, high] = HEAT_RANGE.map(f64::log10);
-    let share = ((difference.max(0.0).log10() - low) / (high - low)).clamp(0.0, 1.0);
+    heat_of_share((difference.max(0.0).log10() - low) / (high - low))
+}
+
+/// The colour (8-bit sRGB) at a share of the scale, 0 at its dark end and 1 at its bright one.
+pub fn heat_of_share(share: f64) -> [u8; 3] {
+    let share = share.clamp(0.0, 1.0);
     let at = share * (STOPS.len() - 1) as f64;
     let i = (at as usize).min(STOPS.len() - 2);
     let mix =

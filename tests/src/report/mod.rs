@@ -12,7 +12,7 @@ use brickfield_optics::QuadratureRule;
 use serde::{Deserialize, Serialize};
 
 pub use front::{Cost, mark_front, on_front};
-pub use heat::{HEAT_RANGE, heat};
+pub use heat::{HEAT_RANGE, heat, heat_of_share};
 pub use machine::{Machine, commit};
 pub use page::page;
 pub use slope::observed_order;

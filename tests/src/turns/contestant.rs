@@ -2,18 +2,25 @@
 
 use std::time::Instant;
 
-use brickfield::bricks::BrickTree;
+use brickfield::bricks::{BlockSource, BrickTree};
 use brickfield::frame::{Backend, FramePlan, RenderError};
-use brickfield::{PrepareError, Residency, Scene, prepare};
-use brickfield_core::Image;
+use brickfield::{
+    BlockResidency, BlockStyle, PrepareBlocksError, PrepareError, Residency, Scene, prepare, prepare_blocks,
+};
+use brickfield_core::{Image, Level};
 
 use super::Turn;
 
-/// A scene of a tree, and the slots of its bricks.
+/// A scene of a tree or of flat blocks, and the slots of its bricks or blocks.
 pub struct Contestant<'a> {
-    tree: &'a BrickTree,
+    subject: Subject<'a>,
     scene: Scene,
-    residency: Residency,
+}
+
+/// What a contestant draws, and what of it is resident.
+enum Subject<'a> {
+    Tree(&'a BrickTree, Residency),
+    Blocks(&'a dyn BlockSource, Vec<Level>, BlockStyle, BlockResidency),
 }
 
 /// A frame and its times in milliseconds.
@@ -35,6 +42,8 @@ pub struct TimedFrame {
 pub enum FrameError {
     #[error(transparent)]
     Prepare(#[from] PrepareError),
+    #[error(transparent)]
+    PrepareBlocks(#[from] PrepareBlocksError),
     #[error("{backend}: {source}")]
     Render { backend: &'static str, source: RenderError },
 }
@@ -42,7 +51,12 @@ pub enum FrameError {
 impl<'a> Contestant<'a> {
     /// A scene whose bricks no backend has yet.
     pub fn new(tree: &'a BrickTree, scene: Scene) -> Contestant<'a> {
-        Contestant { tree, scene, residency: Residency::default() }
+        Contestant { subject: Subject::Tree(tree, Residency::default()), scene }
+    }
+
+    /// A scene of flat blocks at some levels, of which no backend has any yet.
+    pub fn of_blocks(source: &'a dyn BlockSource, levels: Vec<Level>, style: BlockStyle, scene: Scene) -> Self {
+        Contestant { subject: Subject::Blocks(source, levels, style, BlockResidency::default()), scene }
     }
 
     /// Renders a frame. The bricks are resident if the backend's frame before was this contestant's, too; if not, the time
@@ -52,7 +66,12 @@ impl<'a> Contestant<'a> {
     /// A scene that is refused, a backend that fails.
     pub fn frame(&mut self, backend: &mut dyn Backend) -> Result<TimedFrame, FrameError> {
         let begin = Instant::now();
-        let plan = prepare(self.tree, &self.scene, &mut self.residency)?;
+        let plan = match &mut self.subject {
+            Subject::Tree(tree, residency) => prepare(tree, &self.scene, residency)?,
+            Subject::Blocks(source, levels, style, residency) => {
+                prepare_blocks(*source, &self.scene, levels, *style, residency)?
+            }
+        };
         let prepare_ms = milliseconds_since(begin);
         let name = backend.describe().backend;
         let rendered = backend.render(&plan).map_err(|source| FrameError::Render { backend: name, source })?;

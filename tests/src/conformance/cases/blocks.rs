@@ -83,7 +83,7 @@ fn pictures() -> Vec<Case> {
         picture("blocks/fast", catches![shader::HALF_TEXEL, shader::MAXIMUM_TO_THE_FACE], move || {
             random(u16, BlockSide::V8, blended(MaximumDistance)).with(|s| s.mode = Mode::FAST)
         }),
-        picture("blocks/skipping", catches![shader::BLOCKS_SWAPPED, BrickTransparent], move || {
+        picture("blocks/skipping", catches![shader::BLOCKS_SWAPPED, VisibleTooSmall, IndexSwapped], move || {
             let knots = [knot(0.3, 0.0, WARM), knot(0.9, 0.5, COOL)];
             let transfer = spread(&knots, u8).expect("knots ascend");
             let grid = Grid::axis_aligned(UVec3::new(71, 66, 53), DVec3::ONE).expect("a grid");

@@ -1,4 +1,4 @@
-//! Why a part could not be run.
+//! Why a part of a paper's comparisons could not be run.
 
 use std::io;
 use std::path::PathBuf;
@@ -6,11 +6,11 @@ use std::path::PathBuf;
 use crate::compare::CompareError;
 use crate::turns::FrameError;
 
-/// Why a part could not be run.
+/// Why a part of a paper's comparisons could not be run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)]
-pub enum LamarError {
+pub enum PaperError {
     #[error("no data: set BRICKFIELD_DATA (or --data) to the folder of real volumes")]
     NoData,
     #[error("no data: {} is not a folder; BRICKFIELD_DATA (or --data) names that of real volumes", path.display())]
@@ -31,6 +31,18 @@ pub enum LamarError {
     Camera(#[from] brickfield_core::CameraError),
     #[error(transparent)]
     Prepare(#[from] brickfield::PrepareError),
+    #[error(transparent)]
+    PrepareBlocks(#[from] brickfield::PrepareBlocksError),
+    #[error(transparent)]
+    Blocks(#[from] brickfield::bricks::BlockBuildError),
+    #[error(transparent)]
+    Errors(#[from] brickfield::lod::EstimateError),
+    #[error(transparent)]
+    Budget(#[from] brickfield::lod::BudgetError),
+    #[error(transparent)]
+    Fetch(#[from] brickfield::bricks::FetchError),
+    #[error("{backend} cannot evaluate single functions")]
+    NoFunctions { backend: &'static str },
     #[error("{backend}: {source}")]
     Render { backend: &'static str, source: brickfield::frame::RenderError },
     #[error(transparent)]
@@ -43,31 +55,32 @@ pub enum LamarError {
     Print(io::Error),
 }
 
-impl From<CompareError> for LamarError {
-    fn from(e: CompareError) -> LamarError {
-        LamarError::Backends(Box::new(e))
+impl From<CompareError> for PaperError {
+    fn from(e: CompareError) -> PaperError {
+        PaperError::Backends(Box::new(e))
     }
 }
 
-impl From<FrameError> for LamarError {
-    fn from(e: FrameError) -> LamarError {
+impl From<FrameError> for PaperError {
+    fn from(e: FrameError) -> PaperError {
         match e {
-            FrameError::Prepare(e) => LamarError::Prepare(e),
-            FrameError::Render { backend, source } => LamarError::Render { backend, source },
+            FrameError::Prepare(e) => PaperError::Prepare(e),
+            FrameError::PrepareBlocks(e) => PaperError::PrepareBlocks(e),
+            FrameError::Render { backend, source } => PaperError::Render { backend, source },
         }
     }
 }
 
-impl LamarError {
+impl PaperError {
     /// The exit status that scripts see: 1 failed, 2 unusable arguments or data, 3 a required backend is absent.
     pub fn status(&self) -> u8 {
         match self {
-            LamarError::Backends(e) => e.status(),
-            LamarError::NoData
-            | LamarError::NoFolder { .. }
-            | LamarError::NoVolume { .. }
-            | LamarError::NoSuchData { .. }
-            | LamarError::Prepare(_) => 2,
+            PaperError::Backends(e) => e.status(),
+            PaperError::NoData
+            | PaperError::NoFolder { .. }
+            | PaperError::NoVolume { .. }
+            | PaperError::NoSuchData { .. }
+            | PaperError::Prepare(_) => 2,
             _ => 1,
         }
     }

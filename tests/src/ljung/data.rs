@@ -1,0 +1,89 @@
+//! The volumes that are rendered, and their blocks.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use brickfield::bricks::{BlockOptions, BlockSource, BlockVolume, build_blocks};
+use brickfield::frame::Mode;
+use brickfield::io::{OpenOptions, WorldFrame, open};
+use brickfield::lod::{
+    BlockBudget, BlockErrors, BlockSelection, BudgetSize, OneSampleBlocks, Slab, select_block_levels,
+};
+use brickfield::optics::automatic;
+use brickfield::{Scene, Viewpoint};
+use brickfield_core::glam::UVec3;
+use brickfield_core::{ScalarType, TransferFunction, Volume};
+
+use super::LjungArgs;
+use crate::paper::PaperError;
+use crate::volumes::{Phantom, phantom_of};
+
+/// The data sets, as paths below the folder of real volumes.
+const DATA: [&str; 3] = ["ct/LIDC2.mha", "ct/engine.vti", "mri/spm152.nii.gz"];
+
+/// A volume as flat blocks, with its transfer function.
+pub(super) struct DataSet {
+    pub(super) name: String,
+    pub(super) volume: Arc<Volume>,
+    pub(super) blocks: BlockVolume,
+    pub(super) transfer: TransferFunction,
+    pub(super) frame: WorldFrame,
+    errors: BlockErrors,
+}
+
+/// Whether the data that the parts need are there.
+pub(super) fn check_data(args: &LjungArgs) -> Result<(), PaperError> {
+    args.common.check_data(&DATA, args.parts().into_iter().any(|part| part.needs_data()))
+}
+
+/// The volumes that are asked for, one by one; behind the three data sets a generated one.
+pub(super) fn data_sets<'a>(
+    args: &'a LjungArgs,
+) -> Result<impl Iterator<Item = Result<DataSet, PaperError>> + use<'a>, PaperError> {
+    let is_own = args.common.files.is_empty() && args.common.only.is_none();
+    let generated = is_own.then(|| of_phantom(args));
+    Ok(args.common.named(&DATA)?.into_iter().map(|(name, path)| of_file(args, name, path)).chain(generated))
+}
+
+fn of_file(args: &LjungArgs, name: String, path: PathBuf) -> Result<DataSet, PaperError> {
+    let opened = open(&path, &OpenOptions::default())?;
+    let transfer = automatic(&opened.volume);
+    of_volume(args, name, (Arc::new(opened.volume), opened.frame), transfer)
+}
+
+fn of_phantom(args: &LjungArgs) -> Result<DataSet, PaperError> {
+    let Phantom { volume, transfer, .. } = phantom_of(UVec3::splat(args.volume_side), ScalarType::U8);
+    of_volume(args, format!("generated {}^3", args.volume_side), (Arc::new(volume), WorldFrame::Lps), transfer)
+}
+
+fn of_volume(
+    args: &LjungArgs,
+    name: String,
+    (volume, frame): (Arc<Volume>, WorldFrame),
+    transfer: TransferFunction,
+) -> Result<DataSet, PaperError> {
+    let options = BlockOptions { side: args.blocks, ..BlockOptions::default() };
+    let blocks = build_blocks(Arc::clone(&volume), &options)?;
+    let slab = Slab::of_block(blocks.layout(), blocks.grid());
+    let errors = BlockErrors::estimate(blocks.layout(), blocks.summaries(), &transfer, slab)?;
+    Ok(DataSet { name, volume, blocks, transfer, frame, errors })
+}
+
+impl DataSet {
+    /// The levels that a budget buys, whatever the view: one-sample blocks take no texel.
+    pub(super) fn select(&self, size: BudgetSize) -> Result<BlockSelection, PaperError> {
+        let budget = BlockBudget { size, scalar: self.blocks.scalar_type(), one_sample: OneSampleBlocks::Free };
+        Ok(select_block_levels(self.blocks.layout(), self.errors.levels(), None, &budget)?)
+    }
+
+    pub(super) fn errors(&self) -> &BlockErrors {
+        &self.errors
+    }
+
+    /// The whole volume, obliquely.
+    pub(super) fn scene(&self, args: &LjungArgs, mode: Mode) -> Result<Scene, PaperError> {
+        let camera = Viewpoint::default().camera(self.volume.grid(), self.frame, args.common.size)?;
+        let scene = Scene::new(camera, args.common.size, self.transfer.clone());
+        Ok(Scene { step_voxels: args.common.step, mode, ..scene })
+    }
+}

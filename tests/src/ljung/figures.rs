@@ -1,0 +1,64 @@
+//! Pictures of each volume at 32:1: at full resolution, the nearest block, and each scheme; below, the colour difference.
+
+use brickfield::frame::Mode;
+use brickfield::lod::BudgetSize;
+use brickfield::{BlockResidency, prepare_blocks};
+use brickfield_core::Image;
+use brickfield_optics::ColorMetric;
+
+use super::LjungArgs;
+use super::data::{DataSet, data_sets};
+use super::schemes::{joins, style};
+use super::table::answer;
+use crate::compare::rivals::Rivals;
+use crate::paper::panels::{beside, stacked};
+use crate::paper::{Missed, PaperError};
+use crate::report::heat_of_share;
+
+/// The difference at the bright end.
+const BRIGHT: f64 = 20.0;
+
+pub(super) fn run(args: &LjungArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, PaperError> {
+    // For looking, larger than for timing.
+    let mut args = args.clone();
+    args.common.size *= 2;
+    for data_set in data_sets(&args)? {
+        of_data_set(&args, rivals, &data_set?)?;
+    }
+    Ok(Vec::new())
+}
+
+fn of_data_set(args: &LjungArgs, rivals: &mut Rivals, data: &DataSet) -> Result<(), PaperError> {
+    let Some(backend) = rivals.present.last_mut() else { return Ok(()) };
+    let scene = data.scene(args, Mode::Exact)?;
+    let levels = data.select(BudgetSize::Ratio(32.0))?.levels;
+    let answer = answer(data, &scene);
+    let full = Image::new(answer.size(), answer.pixels().iter().map(|p| p.map(|c| c as f32)).collect());
+    let full = full.expect("as many pixels");
+    let (mut pictures, mut differences) = (vec![full.clone()], vec![Image::transparent(answer.size())]);
+    for join in joins() {
+        let plan = prepare_blocks(&data.blocks, &scene, levels.levels(), style(join), &mut BlockResidency::default())?;
+        let name = backend.describe().backend;
+        let frame = backend.render(&plan).map_err(|source| PaperError::Render { backend: name, source })?;
+        differences.push(difference(&frame.image, &answer));
+        pictures.push(frame.image);
+    }
+    let name =
+        data.name.rsplit('/').next().unwrap_or(&data.name).split('.').next().unwrap_or_default().replace(' ', "-");
+    let what = format!(
+        "{} at 32:1: full resolution, nearest block, minimum distance, boundary split, maximum distance; below, Delta E from 0 to {BRIGHT}",
+        data.name
+    );
+    args.common.write_picture(&format!("figure8-{name}"), &stacked(&[beside(&pictures), beside(&differences)]), &what)
+}
+
+fn difference(image: &Image<f32>, answer: &Image<f64>) -> Image<f32> {
+    let mut out = image.clone();
+    for (to, expected) in out.pixels_mut().iter_mut().zip(answer.pixels()) {
+        let found = to.map(f64::from);
+        let d = ColorMetric::CieLuv1976.of_pixels(found, *expected, [0.0; 3]);
+        let [r, g, b] = heat_of_share(d / BRIGHT).map(|c| (f32::from(c) / 255.0).powf(2.2));
+        *to = [r, g, b, 1.0];
+    }
+    out
+}

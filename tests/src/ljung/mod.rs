@@ -1,0 +1,50 @@
+//! Ljung, Lundstroem and Ynnerman 2006 on this project's data: figures 4, 5, 7 and 9, error against time and bytes, the cost of
+//! interpolation between blocks, and reselection.
+//!
+//! - `gradient`: figure 7, a rotated linear gradient at random resolutions. `weights`: figures 4 and 5, read back from backends.
+//! - `continuity`: jumps on faces, edges and corners; equal resolutions against trilinear interpolation.
+//! - `accounting`: figure 9. `table`: error, time, samples and bytes at several budgets. `cost`: schemes against the nearest block.
+//! - `rank`: estimated errors of blocks against exact ones. `reselect`: after an edit of the transfer function. `figures`: pictures.
+
+mod accounting;
+mod args;
+mod continuity;
+mod cost;
+mod data;
+mod figures;
+mod gradient;
+mod rank;
+mod reselect;
+mod schemes;
+mod table;
+mod weights;
+
+pub use args::{LjungArgs, Part};
+
+use crate::paper::{Findings, PaperError, print};
+
+/// Runs the parts that `args` ask for, and prints their findings.
+///
+/// # Errors
+/// Data or a folder that cannot be had, a scene that is refused, a backend that fails.
+pub fn ljung(args: &LjungArgs) -> Result<Findings, PaperError> {
+    data::check_data(args)?;
+    let mut rivals = args.common.begin()?;
+    let mut findings = Findings::default();
+    for part in args.parts() {
+        print(&format!("\n## {}\n", part.title()))?;
+        findings.missed.extend(match part {
+            Part::Gradient => gradient::run(args, &mut rivals)?,
+            Part::Weights => weights::run(args, &mut rivals)?,
+            Part::Continuity => continuity::run(args, &mut rivals)?,
+            Part::Accounting => accounting::run()?,
+            Part::Table => table::run(args, &mut rivals)?,
+            Part::Cost => cost::run(args, &mut rivals)?,
+            Part::Rank => rank::run(args)?,
+            Part::Reselect => reselect::run(args)?,
+            Part::Figures => figures::run(args, &mut rivals)?,
+        });
+    }
+    findings.print()?;
+    Ok(findings)
+}
