@@ -1,19 +1,22 @@
-//! Writing NIfTI files: NIfTI-1 where it loses nothing that NIfTI-2 keeps, else NIfTI-2.
+//! Writing NIfTI files: NIfTI-1, which every reader knows, unless its 32-bit numbers would be seen; then NIfTI-2.
 
 use std::io::{self, Write};
 use std::path::Path;
 
-use brickfield_core::glam::DVec3;
-use brickfield_core::{Rescale, ScalarType, Volume};
+use brickfield_core::glam::{DVec3, DVec4, UVec3};
+use brickfield_core::{Aabb, Rescale, ScalarType, ValueRange, Volume};
 
 use crate::saved::{save_atomically, write_samples};
 use crate::{ByteOrder, SaveError, SaveOptions, WorldFrame};
 
 /// Saves a volume as NIfTI (`.nii`, `.nii.gz`): whole or not at all, for the file is renamed into place.
 ///
-/// NIfTI-1 stores lengths in 32 bits and dimensions up to 32,767; NIfTI-2 (2011) stores 64 bits. The first is written if
-/// all of the volume's numbers are f32 numbers, else the second. The end of the name, `.nii` or `.nii.gz`, says whether it is
-/// compressed. Voxels keep their type, with slope and intercept.
+/// Voxels keep their type, with slope and intercept. The end of the name, `.nii` or `.nii.gz`, says whether they are compressed.
+///
+/// NIfTI-1 has dimensions up to 32,767 and lengths in f32. NIfTI-2 (2011) has 64 bits, and many programs do not open it (ITK
+/// 5.4). It is written only if a dimension is larger, if f32 would move a corner of the volume by more than 1e-3 of the least
+/// spacing, or change a value by more than 1e-2 of the step between stored integers (of stored floats: 1e-6 of the values'
+/// range).
 ///
 /// # Errors
 /// If the folder cannot be written to.
@@ -36,12 +39,21 @@ pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<(), S
 /// The errors of `out`.
 pub fn write(mut out: impl Write, volume: &Volume, options: &SaveOptions) -> io::Result<()> {
     let statements = Statements::of(volume, options);
-    match statements.fit_nifti_1() {
+    match statements.fit_nifti_1(volume.range()) {
         true => out.write_all(&statements.nifti_1())?,
         false => out.write_all(&statements.nifti_2())?,
     }
     write_samples(&mut out, volume.voxels(), ByteOrder::Little)
 }
+
+/// NIfTI-1's dimensions are i16.
+const MAX_DIM: u32 = i16::MAX as u32;
+/// Rounding to f32 may move a corner of the volume by this part of the least spacing.
+const MAX_SHIFT: f64 = 1e-3;
+/// It may change a value by this part of the step between two stored integers,
+const MAX_CHANGE_OF_STEP: f64 = 1e-2;
+/// and where floats are stored by this part of the values' range.
+const MAX_CHANGE_OF_RANGE: f64 = 1e-6;
 
 /// The numbers of a header.
 struct Statements {
@@ -83,11 +95,30 @@ impl Statements {
         }
     }
 
-    fn fit_nifti_1(&self) -> bool {
-        let is_f32 = |v: &f64| f64::from(*v as f32) == *v;
-        let lengths = self.rows.as_flattened().iter().chain([&self.spacing.x, &self.spacing.y, &self.spacing.z]);
-        let rescale = [self.rescale.slope(), self.rescale.intercept()];
-        self.dims.iter().all(|n| *n <= 32_767) && lengths.chain(&rescale).all(is_f32)
+    fn fit_nifti_1(&self, values: ValueRange) -> bool {
+        self.dims.iter().all(|n| *n <= MAX_DIM) && self.keep_place_in_f32() && self.keep_values_in_f32(values)
+    }
+
+    fn keep_place_in_f32(&self) -> bool {
+        let dims = UVec3::from(self.dims).as_dvec3();
+        let errors = self.rows.map(|row| DVec4::from(row.map(f32_error)));
+        let shift = |corner: DVec3| DVec3::from(errors.map(|row| row.dot(corner.extend(1.0)))).length();
+        let moves_little = |corner| shift(corner) <= MAX_SHIFT * self.spacing.min_element();
+        let keeps_length = |axis| f32_error(self.spacing[axis]) * dims[axis] <= MAX_SHIFT * self.spacing[axis];
+        Aabb { min: DVec3::ZERO, max: dims }.corners().into_iter().all(moves_little) && (0..3).all(keeps_length)
+    }
+
+    fn keep_values_in_f32(&self, values: ValueRange) -> bool {
+        let (slope, intercept) = (self.rescale.slope(), self.rescale.intercept());
+        let Ok(rounded) = Rescale::new(f64::from(slope as f32), f64::from(intercept as f32)) else { return false };
+        let max_change = match self.scalar {
+            ScalarType::F32 | ScalarType::F64 => MAX_CHANGE_OF_RANGE * values.max - MAX_CHANGE_OF_RANGE * values.min,
+            _ => MAX_CHANGE_OF_STEP * slope.abs(),
+        };
+        let stored = self.rescale.stored_range(values);
+        // A linear map differs most from another one at an end.
+        let change = |stored| (rounded.value(stored) - self.rescale.value(stored)).abs();
+        change(stored.min) <= max_change && change(stored.max) <= max_change
     }
 
     /// nifti1.h: 348 bytes, and four for extensions, of which there are none.
@@ -149,6 +180,11 @@ impl Statements {
     fn n_bits(&self) -> i16 {
         8 * self.scalar.n_bytes() as i16
     }
+}
+
+/// How much a number changes when it is rounded to f32.
+fn f32_error(v: f64) -> f64 {
+    (f64::from(v as f32) - v).abs()
 }
 
 /// A header's bytes.

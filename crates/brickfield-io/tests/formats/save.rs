@@ -1,8 +1,12 @@
 //! Volumes that are saved and read back, in every format that is written.
 
+#[cfg(feature = "nifti")]
+use brickfield_core::IndexPos;
 use brickfield_core::glam::{DMat3, DQuat, DVec3, EulerRot, UVec3};
 use brickfield_core::{Grid, Rescale, Volume, Voxels};
-use brickfield_io::{Compression, SaveOptions, WorldFrame, open, save};
+#[cfg(feature = "nifti")]
+use brickfield_io::nifti;
+use brickfield_io::{Compression, Opened, SaveOptions, WorldFrame, open, save};
 use proptest::prelude::*;
 
 use crate::common::options;
@@ -62,22 +66,49 @@ fn values(volume: &Volume) -> Vec<f64> {
     (0..volume.voxels().len()).map(|i| volume.value(i)).collect()
 }
 
-/// Saves and opens; values and place must be those that were saved, to the rounding of decimal texts.
-fn check(volume: &Volume, name: &str, save_options: &SaveOptions) -> Result<(), TestCaseError> {
+/// Saves a volume in a folder of its own, and opens it.
+fn saved(volume: &Volume, name: &str, save_options: &SaveOptions) -> Opened {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     save(&path, volume, save_options).unwrap();
-    let opened = open(&path, &options()).unwrap();
+    assert_eq!(folder.path().read_dir().unwrap().count(), 1);
+    open(&path, &options()).unwrap()
+}
+
+/// Saves and opens; values and place must be those that were saved, to the rounding of decimal texts.
+fn check(volume: &Volume, name: &str, save_options: &SaveOptions) -> Result<(), TestCaseError> {
+    let opened = saved(volume, name, save_options);
     prop_assert_eq!(values(&opened.volume), values(volume));
     prop_assert_eq!(opened.volume.grid().dims(), volume.grid().dims());
     let (a, b) = (opened.volume.grid().index_to_world(), volume.grid().index_to_world());
     prop_assert!(a.matrix3.abs_diff_eq(b.matrix3, 1e-9 * 1e3), "{} {}", a, b);
     prop_assert!(a.translation.abs_diff_eq(b.translation, 1e-7), "{} {}", a, b);
     prop_assert!(opened.notes.is_empty(), "{:?}", opened.notes);
-    prop_assert_eq!(folder.path().read_dir().unwrap().count(), 1);
     if volume.rescale() == Rescale::IDENTITY {
         prop_assert_eq!(opened.volume.voxels(), volume.voxels());
     }
+    Ok(())
+}
+
+/// Voxels are those that were saved; corners and values are at most as far off as `nifti::save` says.
+#[cfg(feature = "nifti")]
+fn check_nifti(opened: &Opened, volume: &Volume) -> Result<(), TestCaseError> {
+    let (found, grid, range) = (opened.volume.grid(), volume.grid(), volume.range());
+    prop_assert_eq!(opened.volume.voxels(), volume.voxels());
+    let max_shift = 1e-3 * grid.spacing().min_element() + 1e-7;
+    // From sample 0 to one step behind the last.
+    for corner in grid.index_box().corners().map(|corner| corner + 0.5) {
+        let (a, b) = (found.world(IndexPos(corner)).0, grid.world(IndexPos(corner)).0);
+        prop_assert!(a.distance(b) <= max_shift, "{} {}", a, b);
+    }
+    let max_change = match volume.voxels() {
+        Voxels::F32(_) | Voxels::F64(_) => 1e-6 * range.max - 1e-6 * range.min,
+        _ => 1e-2 * volume.rescale().slope().abs(),
+    };
+    for (a, b) in values(&opened.volume).into_iter().zip(values(volume)) {
+        prop_assert!((a - b).abs() <= max_change * (1.0 + 1e-9), "{} {}", a, b);
+    }
+    prop_assert!(opened.notes.is_empty(), "{:?}", opened.notes);
     Ok(())
 }
 
@@ -105,14 +136,9 @@ proptest! {
     #[cfg(feature = "nifti")]
     #[test]
     fn nifti_keeps_stored_voxels_and_their_rescale(volume in any_volume(any_direction())) {
-        check(&volume, "volume.nii", &SaveOptions::default())?;
-        check(&volume, "volume.nii.gz", &SaveOptions::default())?;
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("volume.nii");
-        save(&path, &volume, &SaveOptions::default()).unwrap();
-        let opened = open(&path, &options()).unwrap();
-        prop_assert_eq!(opened.volume.voxels(), volume.voxels());
-        prop_assert_eq!(opened.volume.rescale(), volume.rescale());
+        for name in ["volume.nii", "volume.nii.gz"] {
+            check_nifti(&saved(&volume, name, &SaveOptions::default()), &volume)?;
+        }
     }
 
     #[cfg(feature = "ome-zarr")]
@@ -175,4 +201,47 @@ fn units_survive_where_the_format_has_them() {
         let unit = open(&path, &options()).unwrap().unit;
         assert!(matches!(unit.as_deref(), Some("um" | "micrometer")), "{name} {unit:?}");
     }
+}
+
+/// Which version a volume is written in: 1 or 2.
+#[cfg(feature = "nifti")]
+fn nifti_version(volume: &Volume) -> u8 {
+    let mut bytes = vec![];
+    nifti::write(&mut bytes, volume, &SaveOptions::default()).unwrap();
+    match bytes.first_chunk().map(|b| u32::from_le_bytes(*b)) {
+        Some(348) => 1,
+        Some(540) => 2,
+        other => panic!("header of {other:?} bytes"),
+    }
+}
+
+#[cfg(feature = "nifti")]
+#[test]
+fn nifti_1_is_written_unless_its_rounding_would_be_seen() {
+    let turned = DMat3::from_quat(DQuat::from_euler(EulerRot::XYZ, 0.3, -0.2, 0.1));
+    let at = |dims: [u32; 3], spacing: f64, first: f64| {
+        let grid = Grid::from_first_sample(dims.into(), DVec3::splat(spacing), DVec3::splat(first), turned).unwrap();
+        Volume::new(grid, vec![0u8; grid.n_voxels()]).unwrap()
+    };
+    assert_eq!(nifti_version(&at([512, 4, 2], 0.1, -123.456)), 1);
+    assert_eq!(nifti_version(&at([4, 4, 2], 0.1, 1e4 + 0.3)), 2);
+    assert_eq!(nifti_version(&at([4, 4, 2], 1e-46, 0.0)), 2);
+    assert_eq!(nifti_version(&at([32_767, 1, 1], 0.5, 0.0)), 1);
+    assert_eq!(nifti_version(&at([32_768, 1, 1], 0.5, 0.0)), 2);
+}
+
+#[cfg(feature = "nifti")]
+#[test]
+fn nifti_2_keeps_slopes_that_f32_would_change() {
+    let version = |voxels: Voxels, slope: f64, intercept: f64| {
+        let grid = Grid::axis_aligned(UVec3::new(2, 1, 1), DVec3::ONE).unwrap();
+        nifti_version(&Volume::rescaled(grid, voxels, Rescale::new(slope, intercept).unwrap()).unwrap())
+    };
+    assert_eq!(version(vec![0u16, u16::MAX].into(), 0.1, -1024.1), 1);
+    assert_eq!(version(vec![0i32, i32::MAX].into(), 0.1, 0.0), 2);
+    assert_eq!(version(vec![0i32, i32::MAX].into(), 0.5, 0.0), 1);
+    assert_eq!(version(vec![0u8, 255].into(), 1e-6, 1000.1), 2);
+    assert_eq!(version(vec![0u8, 0].into(), 1e-60, 3.0), 2);
+    assert_eq!(version(vec![-1f32, 1.0].into(), 0.1, 0.3), 1);
+    assert_eq!(version(vec![1e9f64, 1e9 + 1.0].into(), 0.1, 0.0), 2);
 }
