@@ -47,6 +47,7 @@ mod rescale;
 mod runs;
 mod samples;
 mod save;
+mod save_note;
 mod saved;
 mod series;
 mod stored;
@@ -73,6 +74,7 @@ pub use opened::{Opened, WorldFrame};
 pub use options::OpenOptions;
 pub use raw::RawSpec;
 pub use save::save;
+pub use save_note::{SaveNote, Saved};
 pub use saved::{Compression, SAVED_EXTENSIONS, SaveError, SaveOptions};
 
 /// The stored types that can be read, for messages.

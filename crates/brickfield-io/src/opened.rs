@@ -38,6 +38,32 @@ pub enum WorldFrame {
     Plain,
 }
 
+impl WorldFrame {
+    /// The key under which a file states its frame, where its format has no words for it but keys of one's own.
+    pub(crate) const KEY: &str = "brickfield_frame";
+    const NAMES: [(WorldFrame, &str); 3] =
+        [(WorldFrame::Lps, "lps"), (WorldFrame::Pictures, "pictures"), (WorldFrame::Plain, "plain")];
+
+    /// The name in files.
+    pub(crate) fn name(self) -> &'static str {
+        WorldFrame::NAMES.into_iter().find(|(frame, _)| *frame == self).map_or("", |(_, name)| name)
+    }
+
+    /// The frame of a name in files.
+    pub(crate) fn of_name(name: &str) -> Option<WorldFrame> {
+        WorldFrame::NAMES.into_iter().find(|(_, known)| name.trim() == *known).map(|(frame, _)| frame)
+    }
+
+    /// The directions of the axes, for messages.
+    pub(crate) fn axes(self) -> &'static str {
+        match self {
+            WorldFrame::Lps => "+x left, +y back, +z head",
+            WorldFrame::Pictures => "+x right, +y down, +z into the stack",
+            WorldFrame::Plain => "axes without meaning",
+        }
+    }
+}
+
 /// The parts of [`Opened`] before the volume is made.
 pub(crate) struct FileFacts {
     pub(crate) format: Format,

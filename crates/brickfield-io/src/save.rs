@@ -6,16 +6,16 @@ use brickfield_core::Volume;
 
 #[cfg(not(all(feature = "nifti", feature = "ome-zarr")))]
 use crate::Format;
-use crate::{ByteOrder, SaveError, SaveOptions, metaimage, nrrd, raw};
+use crate::{ByteOrder, SaveError, SaveOptions, Saved, metaimage, nrrd, raw};
 
 /// Saves a volume in the format that the end of the name suggests: `.nrrd`, `.mha`, `.nii`, `.nii.gz`, `.zarr` or `.raw`.
 ///
 /// Values, spacing and direction survive: a format that has no rescale gets the values (f32 if it holds all of them exactly,
-/// else f64). `.raw` holds the voxels alone.
+/// else f64). `.raw` holds the values alone. What the file does not state is noted in [`Saved::notes`].
 ///
 /// # Errors
 /// If the format cannot say where the volume lies, or the folder cannot be written to.
-pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<(), SaveError> {
+pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<Saved, SaveError> {
     let name = path.file_name().map(|name| name.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let ends = |end: &str| name.len() > end.len() && name.ends_with(end);
     if ends(".nrrd") {

@@ -71,6 +71,9 @@ fn rescaled_integers_take_the_bytes_of_integers() {
     let said: serde_json::Value = serde_json::from_slice(&place.run("info|b.nii|--json").stdout).unwrap();
     assert_eq!((&said["type"], &said["bytes"]), (&"u8".into(), &960.into()));
     assert_eq!(said["values"], serde_json::json!({ "min": -1024.0, "max": -899.0 }));
+    let out = place.run("convert|b.nii|-o|b.mha");
+    assert_eq!(text(&out.stdout), "b.mha: 12 x 10 x 8 voxels of f32\n");
+    assert!(text(&out.stderr).contains("note: MetaImage stores no slope and intercept"), "{}", text(&out.stderr));
     let bricks = |file: &str| {
         let out = place.run(&format!("render|{file}|-o|{file}.png|{SMALL}"));
         let said = text(&out.stdout);

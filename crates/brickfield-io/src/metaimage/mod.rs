@@ -227,7 +227,9 @@ impl MetaHeader {
     }
 
     fn frame(&self) -> WorldFrame {
+        let stated = self.text(&[WorldFrame::KEY]).and_then(WorldFrame::of_name);
         match self.text(&["anatomicalorientation"]) {
+            _ if stated.is_some() => stated.unwrap_or_default(),
             Some(text) if !text.contains('?') && !text.is_empty() => WorldFrame::Lps,
             _ => WorldFrame::Plain,
         }

@@ -6,8 +6,10 @@ use std::path::Path;
 use brickfield_core::glam::{DVec3, DVec4, UVec3};
 use brickfield_core::{Aabb, Rescale, ScalarType, ValueRange, Volume};
 
+use crate::placement::{AXES, is_upright};
+use crate::save_note::Stated;
 use crate::saved::{save_atomically, write_samples};
-use crate::{ByteOrder, SaveError, SaveOptions, WorldFrame};
+use crate::{ByteOrder, Format, SaveError, SaveNote, SaveOptions, Saved, WorldFrame};
 
 /// Saves a volume as NIfTI (`.nii`, `.nii.gz`): whole or not at all, for the file is renamed into place.
 ///
@@ -20,30 +22,37 @@ use crate::{ByteOrder, SaveError, SaveOptions, WorldFrame};
 ///
 /// # Errors
 /// If the folder cannot be written to.
-pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<(), SaveError> {
+pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<Saved, SaveError> {
     let is_gz = path.to_string_lossy().to_ascii_lowercase().ends_with(".gz");
     save_atomically(path, |out| match is_gz {
         true => {
             let mut gz = flate2::write::GzEncoder::new(out, flate2::Compression::default());
-            write(&mut gz, volume, options)?;
-            gz.finish()?.flush()
+            let saved = write(&mut gz, volume, options)?;
+            gz.finish()?.flush()?;
+            Ok(saved)
         }
         false => write(out, volume, options),
     })
 }
 
 /// Writes a volume as NIfTI, little-endian and not compressed. The world is right-anterior-superior, so that x and y change
-/// their sign; a frame that is not anatomical is written likewise, for NIfTI has no other.
+/// their sign; a frame that is not anatomical is written likewise, for NIfTI has no other. Only a plain one whose axes are those
+/// of the volume, from its first sample on, is left unstated.
 ///
 /// # Errors
 /// The errors of `out`.
-pub fn write(mut out: impl Write, volume: &Volume, options: &SaveOptions) -> io::Result<()> {
+pub fn write(mut out: impl Write, volume: &Volume, options: &SaveOptions) -> io::Result<Saved> {
     let statements = Statements::of(volume, options);
-    match statements.fit_nifti_1(volume.range()) {
-        true => out.write_all(&statements.nifti_1())?,
-        false => out.write_all(&statements.nifti_2())?,
+    let beyond = statements.beyond_nifti_1(volume.range());
+    match beyond {
+        None => out.write_all(&statements.nifti_1())?,
+        Some(_) => out.write_all(&statements.nifti_2())?,
     }
-    write_samples(&mut out, volume.voxels(), ByteOrder::Little)
+    write_samples(&mut out, volume.voxels(), ByteOrder::Little)?;
+    let stated = Stated { frame: statements.frame(), unit: statements.units != 0 };
+    let mut saved = Saved::of(Format::Nifti, volume, volume.scalar_type(), options, stated);
+    saved.notes.extend(beyond.map(|reason| SaveNote::Nifti2 { reason }));
+    Ok(saved)
 }
 
 /// NIfTI-1's dimensions are i16.
@@ -64,7 +73,7 @@ struct Statements {
     rows: [[f64; 4]; 3],
     rescale: Rescale,
     units: u8,
-    /// nifti1.h: 1 is the scanner's world, 2 another one.
+    /// nifti1.h: 1 is the scanner's world, 2 another one, 0 none: there are lengths of voxels, and nothing else.
     code: u8,
 }
 
@@ -91,12 +100,32 @@ impl Statements {
             rows: [row(0), row(1), row(2)],
             rescale: volume.rescale(),
             units,
-            code: if options.frame == WorldFrame::Lps { 1 } else { 2 },
+            code: match options.frame {
+                WorldFrame::Lps => 1,
+                WorldFrame::Plain if first_sample == DVec3::ZERO && is_upright(grid) => 0,
+                WorldFrame::Plain | WorldFrame::Pictures => 2,
+            },
         }
     }
 
-    fn fit_nifti_1(&self, values: ValueRange) -> bool {
-        self.dims.iter().all(|n| *n <= MAX_DIM) && self.keep_place_in_f32() && self.keep_values_in_f32(values)
+    /// Why NIfTI-1 does not do.
+    fn beyond_nifti_1(&self, values: ValueRange) -> Option<String> {
+        let (axes, dims) = (AXES.into_iter(), self.dims);
+        if let Some((axis, n)) = axes.zip(dims).find(|(_, n)| *n > MAX_DIM) {
+            return Some(format!("dimension {axis} is {n}, and NIfTI-1 has at most {MAX_DIM}"));
+        }
+        if !self.keep_place_in_f32() {
+            return Some(format!("in NIfTI-1 (f32) a corner would move by more than {MAX_SHIFT} of the least spacing"));
+        }
+        (!self.keep_values_in_f32(values)).then(|| {
+            let (slope, intercept) = (self.rescale.slope(), self.rescale.intercept());
+            format!("in NIfTI-1 (f32) slope {slope} and intercept {intercept} would give other values")
+        })
+    }
+
+    /// The frame in which the file is read.
+    fn frame(&self) -> WorldFrame {
+        if self.code == 0 { WorldFrame::Plain } else { WorldFrame::Lps }
     }
 
     fn keep_place_in_f32(&self) -> bool {

@@ -88,14 +88,15 @@ fn volume_axes(header: &NrrdHeader, directions: &Option<Directions>) -> Vec<usiz
 
 /// The frame, and the factors that bring the file's axes to it.
 fn frame_of(header: &NrrdHeader) -> (WorldFrame, DVec3) {
+    let stated = header.key(WorldFrame::KEY).and_then(WorldFrame::of_name);
     let space = header.text("space").unwrap_or("").to_ascii_lowercase();
     let factors = match space.trim_end_matches("-time").trim_end_matches('t') {
         "left-posterior-superior" | "lps" => DVec3::ONE,
         "right-anterior-superior" | "ras" => DVec3::new(-1.0, -1.0, 1.0),
         "left-anterior-superior" | "las" => DVec3::new(1.0, -1.0, 1.0),
-        _ => return (WorldFrame::Plain, DVec3::ONE),
+        _ => return (stated.unwrap_or(WorldFrame::Plain), DVec3::ONE),
     };
-    (WorldFrame::Lps, factors)
+    (stated.unwrap_or(WorldFrame::Lps), factors)
 }
 
 fn oriented(header: &NrrdHeader, directions: &Directions, axes: &[usize]) -> Result<GridPlacement, ReadError> {

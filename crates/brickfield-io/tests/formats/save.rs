@@ -68,11 +68,18 @@ fn values(volume: &Volume) -> Vec<f64> {
 
 /// Saves a volume in a folder of its own, and opens it.
 fn saved(volume: &Volume, name: &str, save_options: &SaveOptions) -> Opened {
+    noted(volume, name, save_options).0
+}
+
+/// The same, and what is said about the file.
+fn noted(volume: &Volume, name: &str, save_options: &SaveOptions) -> (Opened, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
-    save(&path, volume, save_options).unwrap();
+    let saved = save(&path, volume, save_options).unwrap();
     assert_eq!(folder.path().read_dir().unwrap().count(), 1);
-    open(&path, &options()).unwrap()
+    let opened = open(&path, &options()).unwrap();
+    assert_eq!(opened.volume.scalar_type(), saved.scalar);
+    (opened, saved.notes.iter().map(ToString::to_string).collect())
 }
 
 /// Saves and opens; values and place must be those that were saved, to the rounding of decimal texts.
@@ -191,6 +198,61 @@ fn ome_zarr_is_whole_or_not_at_all() {
 }
 
 #[test]
+fn a_format_without_slopes_gets_values_in_another_type_and_says_so() {
+    let volume = Volume::rescaled(*small(DMat3::IDENTITY).grid(), vec![7u8; 420], Rescale::new(0.5, 0.25).unwrap());
+    let volume = volume.unwrap();
+    let said = |name: &str| noted(&volume, name, &SaveOptions::default()).1;
+    let note = "MetaImage stores no slope and intercept: u8 samples were saved as their values, in f32";
+    assert_eq!(said("v.mha"), [note]);
+    assert!(said("v.nrrd")[0].starts_with("NRRD stores no slope"));
+    #[cfg(feature = "nifti")]
+    assert_eq!(said("v.nii"), [""; 0]);
+}
+
+#[test]
+fn the_frame_survives_or_its_loss_is_said() {
+    let mut save_options = SaveOptions::default();
+    for frame in [WorldFrame::Lps, WorldFrame::Pictures, WorldFrame::Plain] {
+        save_options.frame = frame;
+        let mut names = vec!["v.nrrd", "v.mha"];
+        names.extend(cfg!(feature = "ome-zarr").then_some("v.zarr"));
+        for name in names {
+            let (opened, said) = noted(&small(DMat3::IDENTITY), name, &save_options);
+            assert_eq!((opened.frame, said), (frame, vec![]), "{name}");
+        }
+    }
+}
+
+#[cfg(feature = "nifti")]
+#[test]
+fn nifti_states_no_frame_but_the_patients() {
+    let noted = |volume: &Volume, frame: WorldFrame| {
+        let mut save_options = SaveOptions::default();
+        save_options.frame = frame;
+        let (opened, said) = noted(volume, "v.nii", &save_options);
+        assert_eq!(opened.volume.grid(), volume.grid());
+        (opened.frame, said)
+    };
+    let turned = small(DMat3::from_diagonal(DVec3::new(-1.0, -1.0, 1.0)));
+    assert_eq!(noted(&turned, WorldFrame::Lps), (WorldFrame::Lps, vec![]));
+    let lost =
+        "NIfTI cannot state the frame Plain (axes without meaning); it is read as Lps (+x left, +y back, +z head)";
+    assert_eq!(noted(&turned, WorldFrame::Plain), (WorldFrame::Lps, vec![lost.to_owned()]));
+    let lost = "NIfTI cannot state the frame Pictures (+x right, +y down, +z into the stack); it is read as Lps (+x left, \
+                +y back, +z head), and cameras by name look from other sides";
+    assert_eq!(noted(&turned, WorldFrame::Pictures), (WorldFrame::Lps, vec![lost.to_owned()]));
+    // Nothing is stated but the lengths of voxels, and nothing is lost.
+    assert_eq!(noted(&small(DMat3::IDENTITY), WorldFrame::Plain), (WorldFrame::Plain, vec![]));
+}
+
+#[test]
+fn a_raw_file_is_told_how_to_be_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let saved = save(&folder.path().join("v.raw"), &small(DMat3::IDENTITY), &SaveOptions::default()).unwrap();
+    assert!(saved.notes[0].to_string().contains("--raw 70x3x2,u16,spacing=1:1:1 reads it"));
+}
+
+#[test]
 fn units_survive_where_the_format_has_them() {
     for name in ["v.nrrd", "v.nii", "v.zarr"] {
         let folder = tempfile::tempdir().unwrap();
@@ -228,6 +290,20 @@ fn nifti_1_is_written_unless_its_rounding_would_be_seen() {
     assert_eq!(nifti_version(&at([4, 4, 2], 1e-46, 0.0)), 2);
     assert_eq!(nifti_version(&at([32_767, 1, 1], 0.5, 0.0)), 1);
     assert_eq!(nifti_version(&at([32_768, 1, 1], 0.5, 0.0)), 2);
+    let (_, said) = noted(&at([32_768, 1, 1], 0.5, 0.0), "v.nii", &lps());
+    let reason = "dimension x is 32768, and NIfTI-1 has at most 32767";
+    assert_eq!(said, [format!("the file is NIfTI-2, which many programs do not open, for {reason}")]);
+    assert_eq!(noted(&at([4, 4, 2], 0.1, 0.3), "v.nii.gz", &lps()).1, [""; 0]);
+    assert!(
+        noted(&at([4, 4, 2], 0.1, 1e5 + 0.3), "v.nii", &lps()).1[0].contains("a corner would move by more than 0.001")
+    );
+}
+
+#[cfg(feature = "nifti")]
+fn lps() -> SaveOptions {
+    let mut save_options = SaveOptions::default();
+    save_options.frame = WorldFrame::Lps;
+    save_options
 }
 
 #[cfg(feature = "nifti")]

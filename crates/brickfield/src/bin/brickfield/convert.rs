@@ -11,7 +11,8 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     options.frame = opened.frame;
     options.unit = opened.unit;
     options.compression = if args.unpacked { Compression::None } else { Compression::Lossless };
-    save(&args.out, &opened.volume, &options)?;
-    let (dims, scalar) = (opened.volume.grid().dims(), opened.volume.scalar_type());
+    let saved = save(&args.out, &opened.volume, &options)?;
+    saved.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    let (dims, scalar) = (opened.volume.grid().dims(), saved.scalar);
     print(&format!("{}: {} x {} x {} voxels of {scalar}\n", args.out.display(), dims.x, dims.y, dims.z))
 }
