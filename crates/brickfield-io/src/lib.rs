@@ -16,7 +16,6 @@ mod foreign;
 mod format;
 #[cfg(any(feature = "dicom", feature = "ome-zarr", feature = "tiff", feature = "png", feature = "vti"))]
 mod guard;
-#[cfg(any(feature = "ome-zarr", feature = "tiff"))]
 mod length_unit;
 mod limits;
 mod lines;

@@ -19,6 +19,7 @@ use crate::detached::{Promised, read_detached};
 use crate::error::{Shown, counted};
 use crate::file_list::FileNames;
 use crate::files::ByteSource;
+use crate::length_unit::unit_among;
 use crate::limits::{CheckedShape, n_samples};
 use crate::lines::{HeaderLines, numbers};
 use crate::opened::FileFacts;
@@ -54,7 +55,7 @@ fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenO
         Some(names) => read_detached(names, promised, &shape, &stored, files, &mut found.notes)?,
         None => stored.read(source, &promised.attached(&shape), &shape, &mut found.notes)?,
     };
-    found.frame = header.frame();
+    (found.frame, found.unit) = (header.frame(), header.unit());
     found.finish(grid, voxels)
 }
 
@@ -66,6 +67,9 @@ struct MetaHeader {
 }
 
 const MAX_AXES: usize = 10;
+
+/// The units of length that MetaIO knows.
+const UNITS: [&str; 3] = ["um", "mm", "cm"];
 
 /// Keys with which a MetaImage header begins, in lower case.
 const FIRST_KEYS: [&str; 8] =
@@ -224,6 +228,10 @@ impl MetaHeader {
             true => Ok(Some(values)),
             false => Err(ReadError::field(field, text, counted(n, "number", "numbers"))),
         }
+    }
+
+    fn unit(&self) -> Option<String> {
+        unit_among(self.text(&["distanceunits"])?, &UNITS).map(str::to_owned)
     }
 
     fn frame(&self) -> WorldFrame {

@@ -7,8 +7,10 @@ use std::path::Path;
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Grid, ScalarType, Volume};
 
+use super::UNITS;
 #[cfg(feature = "gzip")]
 use crate::Compression;
+use crate::length_unit::unit_among;
 use crate::save_note::Stated;
 use crate::saved::{save_atomically, values, write_samples};
 use crate::{ByteOrder, Format, SaveError, SaveOptions, Saved, WorldFrame};
@@ -21,7 +23,7 @@ pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<Saved
     save_atomically(path, |out| write(out, volume, options))
 }
 
-/// Writes a volume as attached MetaImage, little-endian. It states no unit. A frame of pictures is a key of our own.
+/// Writes a volume as attached MetaImage, little-endian. Of units it states um, mm and cm. A frame of pictures is a key of our own.
 ///
 /// # Errors
 /// The errors of `out`.
@@ -42,8 +44,12 @@ pub fn write(mut out: impl Write, volume: &Volume, options: &SaveOptions) -> io:
         Some(packed) => out.write_all(&packed)?,
         None => write_samples(&mut out, &voxels, ByteOrder::Little)?,
     }
-    let stated = Stated { frame: options.frame, unit: false };
+    let stated = Stated { frame: options.frame, unit: unit(options).is_some() };
     Ok(Saved::of(Format::MetaImage, volume, voxels.scalar_type(), options, stated))
+}
+
+fn unit(options: &SaveOptions) -> Option<&'static str> {
+    unit_among(options.unit.as_deref()?, &UNITS)
 }
 
 fn header(grid: &Grid, scalar: ScalarType, options: &SaveOptions, n_packed: Option<usize>) -> String {
@@ -65,6 +71,9 @@ fn header(grid: &Grid, scalar: ScalarType, options: &SaveOptions, n_packed: Opti
         WorldFrame::Pictures => format!("{} = {}\n", WorldFrame::KEY, options.frame.name()),
         WorldFrame::Plain => String::new(),
     };
+    if let Some(unit) = unit(options) {
+        text += &format!("DistanceUnits = {unit}\n");
+    }
     let dims = grid.dims();
     let _ = write!(
         text,

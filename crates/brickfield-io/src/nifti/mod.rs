@@ -162,12 +162,10 @@ fn by_qform(header: &NiftiHeader, spacing: DVec3) -> Option<GridPlacement> {
     Some(GridPlacement { first_sample, steps })
 }
 
+/// nifti1.h: the units of length, from code 1 on.
+const UNITS: [&str; 3] = ["m", "mm", "um"];
+
 fn unit(header: &NiftiHeader) -> Option<String> {
-    let name = match header.units & 7 {
-        1 => "m",
-        2 => "mm",
-        3 => "um",
-        _ => return None,
-    };
-    Some(name.to_owned())
+    let code = usize::try_from(header.units & 7).ok()?;
+    UNITS.get(code.checked_sub(1)?).map(|name| (*name).to_owned())
 }

@@ -6,6 +6,8 @@ use std::path::Path;
 use brickfield_core::glam::{DVec3, DVec4, UVec3};
 use brickfield_core::{Aabb, Rescale, ScalarType, ValueRange, Volume};
 
+use super::UNITS;
+use crate::length_unit::unit_among;
 use crate::placement::{AXES, is_upright};
 use crate::save_note::Stated;
 use crate::saved::{save_atomically, write_samples};
@@ -87,12 +89,8 @@ impl Statements {
             let m = map.matrix3;
             [m.x_axis[axis], m.y_axis[axis], m.z_axis[axis], first_sample[axis]].map(|v| sign * v)
         };
-        let units = match options.unit.as_deref() {
-            Some("m" | "meter") => 1,
-            Some("mm" | "millimeter") => 2,
-            Some("um" | "micrometer") => 3,
-            _ => 0,
-        };
+        let unit = options.unit.as_deref().and_then(|unit| unit_among(unit, &UNITS));
+        let units = UNITS.iter().position(|name| Some(*name) == unit).map_or(0, |i| i as u8 + 1);
         Statements {
             dims: grid.dims().to_array(),
             scalar: volume.scalar_type(),

@@ -8,6 +8,7 @@ use brickfield_core::{Grid, ScalarType, Volume};
 
 #[cfg(feature = "gzip")]
 use crate::Compression;
+use crate::length_unit::unit_among;
 use crate::save_note::Stated;
 use crate::saved::{save_atomically, values, write_samples};
 use crate::{ByteOrder, Format, SaveError, SaveOptions, Saved, WorldFrame};
@@ -45,9 +46,11 @@ pub fn write(mut out: impl Write, volume: &Volume, options: &SaveOptions) -> io:
     Ok(Saved::of(Format::Nrrd, volume, voxels.scalar_type(), options, stated))
 }
 
-/// The unit as the header can have it: in ASCII, for some readers drop all else, and without quotes.
+/// The unit as the header can have it: without quotes, and in ASCII, for some readers drop all else: of µm they have m.
 fn unit(options: &SaveOptions) -> Option<&str> {
-    options.unit.as_deref().filter(|unit| !unit.contains(['"', '\n', '\r']))
+    let unit = options.unit.as_deref()?;
+    let is_plain = unit.is_ascii() && !unit.contains(['"', '\n', '\r']);
+    is_plain.then_some(unit).or_else(|| unit_among(unit, &["um", "angstrom", "in"]))
 }
 
 fn header(grid: &Grid, scalar: ScalarType, options: &SaveOptions, encoding: &str) -> String {

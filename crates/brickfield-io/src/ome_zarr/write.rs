@@ -11,6 +11,7 @@ use zarrs::array::{Array, ArraySubset, CodecOptions};
 use zarrs::filesystem::FilesystemStore;
 use zarrs::storage::ReadableWritableListableStorage;
 
+use crate::length_unit::unit_among;
 use crate::placement::{AXES, is_turned};
 use crate::save_note::Stated;
 use crate::saved::{UNFINISHED, folder_of, values};
@@ -108,17 +109,40 @@ fn group(grid: &Grid, options: &SaveOptions) -> Value {
     })
 }
 
-/// OME-Zarr spells units out.
+/// The names of units of length (OME-Zarr 0.5, "axes" metadata).
+const UNITS: [&str; 26] = [
+    "angstrom",
+    "attometer",
+    "centimeter",
+    "decimeter",
+    "exameter",
+    "femtometer",
+    "foot",
+    "gigameter",
+    "hectometer",
+    "inch",
+    "kilometer",
+    "megameter",
+    "meter",
+    "micrometer",
+    "mile",
+    "millimeter",
+    "nanometer",
+    "parsec",
+    "petameter",
+    "picometer",
+    "terameter",
+    "yard",
+    "yoctometer",
+    "yottameter",
+    "zeptometer",
+    "zettameter",
+];
+
+/// The unit, spelled out.
 fn unit(options: &SaveOptions) -> Option<&str> {
-    Some(match options.unit.as_deref()? {
-        "m" => "meter",
-        "cm" => "centimeter",
-        "mm" => "millimeter",
-        "um" | "µm" => "micrometer",
-        "nm" => "nanometer",
-        "pm" => "picometer",
-        other => other,
-    })
+    let unit = options.unit.as_deref()?;
+    Some(unit_among(unit, &UNITS).unwrap_or(unit))
 }
 
 /// The metadata of the array.

@@ -254,14 +254,37 @@ fn a_raw_file_is_told_how_to_be_read() {
 
 #[test]
 fn units_survive_where_the_format_has_them() {
-    for name in ["v.nrrd", "v.nii", "v.zarr"] {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(name);
+    let um = ["um", "\u{b5}m", "\u{3bc}m", "micron", "micrometer"];
+    let mut cases = vec![("v.nrrd", "mm", "mm"), ("v.nrrd", "\"", "in"), ("v.mha", "millimeter", "mm")];
+    cases.extend(um.map(|unit| ("v.mha", unit, "um")));
+    cases.extend(["um", "\u{b5}m", "\u{3bc}m"].map(|unit| ("v.nrrd", unit, "um")));
+    if cfg!(feature = "nifti") {
+        cases.extend(um.map(|unit| ("v.nii", unit, "um")));
+        cases.push(("v.nii", "metre", "m"));
+    }
+    if cfg!(feature = "ome-zarr") {
+        cases.extend(um.map(|unit| ("v.zarr", unit, "micrometer")));
+        cases.extend([("v.zarr", "\u{c5}", "angstrom"), ("v.zarr", "in", "inch"), ("v.zarr", "pixel", "pixel")]);
+    }
+    for (name, unit, expected) in cases {
         let mut save_options = SaveOptions::default();
-        save_options.unit = Some("um".to_owned());
-        save(&path, &small(DMat3::IDENTITY), &save_options).unwrap();
-        let unit = open(&path, &options()).unwrap().unit;
-        assert!(matches!(unit.as_deref(), Some("um" | "micrometer")), "{name} {unit:?}");
+        save_options.unit = Some(unit.to_owned());
+        let (opened, said) = noted(&small(DMat3::IDENTITY), name, &save_options);
+        assert_eq!((opened.unit.as_deref(), said), (Some(expected), vec![]), "{name} {unit}");
+    }
+}
+
+#[test]
+fn a_unit_that_the_format_has_not_is_said() {
+    let mut save_options = SaveOptions::default();
+    save_options.unit = Some("nm".to_owned());
+    for (name, format) in [("v.mha", "MetaImage"), ("v.nii", "NIfTI")] {
+        if name.ends_with(".nii") && !cfg!(feature = "nifti") {
+            continue;
+        }
+        let (opened, said) = noted(&small(DMat3::IDENTITY), name, &save_options);
+        let lost = format!("{format} cannot state the unit \"nm\"; lengths are the same numbers without it");
+        assert_eq!((opened.unit, said), (None, vec![lost]));
     }
 }
 
