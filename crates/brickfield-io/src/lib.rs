@@ -72,7 +72,7 @@ pub use open::{detect, open, open_raw};
 pub use opened::{Opened, WorldFrame};
 pub use options::OpenOptions;
 pub use raw::RawSpec;
-pub use save::save;
+pub use save::{check_save_path, save};
 pub use save_note::{SaveNote, Saved};
 pub use saved::{Compression, SAVED_EXTENSIONS, SaveError, SaveOptions};
 

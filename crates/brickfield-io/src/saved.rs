@@ -45,6 +45,12 @@ pub enum SaveError {
     Io { path: PathBuf, source: io::Error },
     #[error("{}: the end of the name is none of {SAVED_EXTENSIONS}", path.display())]
     UnknownExtension { path: PathBuf },
+    #[error("{}: there is no folder {}", path.display(), folder.display())]
+    NoFolder { path: PathBuf, folder: PathBuf },
+    #[error("{}: it is a folder", path.display())]
+    IsFolder { path: PathBuf },
+    #[error("{}: there is one already, and a folder is not replaced; remove it, or take another name", path.display())]
+    IsThere { path: PathBuf },
     #[error("{}: {format} {fault}", path.display())]
     Unsupported { path: PathBuf, format: Format, fault: String },
 }
@@ -81,6 +87,12 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     }
+}
+
+/// Whether a file can be made in the folder that this one lies in.
+pub(crate) fn check_folder_of(path: &Path) -> Result<(), SaveError> {
+    let draft = tempfile::Builder::new().prefix(UNFINISHED).tempfile_in(folder_of(path));
+    draft.map(drop).map_err(|source| SaveError::Io { path: path.to_owned(), source })
 }
 
 /// How the names of unfinished files and folders begin.

@@ -93,9 +93,16 @@ fn a_volume_is_saved_in_another_format() {
         let saved = open(&place.path().join(name), &OpenOptions::default()).unwrap();
         assert_eq!(saved.volume.voxels(), original.volume.voxels(), "{name}");
     }
-    let refused = place.run("convert|a.nrrd|-o|b.tif");
-    assert_eq!(refused.status.code(), Some(1));
-    assert!(text(&refused.stderr).contains("the end of the name is none of .nrrd"), "{}", text(&refused.stderr));
+    for (out, part) in [
+        ("b.tif", "b.tif: the end of the name is none of .nrrd"),
+        ("no/b.nrrd", "no/b.nrrd: there is no folder no"),
+        ("b.zarr", "b.zarr: there is one already, and a folder is not replaced; remove it, or take another name"),
+    ] {
+        // Before the input is looked for.
+        let refused = place.run(&format!("convert|none.nrrd|-o|{out}"));
+        assert_eq!(refused.status.code(), Some(2), "{out}");
+        assert!(text(&refused.stderr).contains(part), "{}", text(&refused.stderr));
+    }
     let refused = place.run("info|a.nrrd|--channel|2");
     assert!(text(&refused.stderr).contains("channel is \"2\"; expected 0"), "{}", text(&refused.stderr));
 }

@@ -31,7 +31,7 @@ pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<Saved
         return Err(SaveError::Unsupported { path: path.to_owned(), format: Format::OmeZarr, fault });
     }
     if path.exists() {
-        return Err(fault(io::ErrorKind::AlreadyExists.into()));
+        return Err(SaveError::IsThere { path: path.to_owned() });
     }
     let unfinished = tempfile::Builder::new().prefix(UNFINISHED).tempdir_in(folder_of(path)).map_err(fault)?;
     let folder = unfinished.path().join("image");
@@ -45,7 +45,7 @@ pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<Saved
 fn turned(grid: &Grid) -> Option<String> {
     let axis = (0..3).find(|axis| is_turned(grid, *axis))?;
     Some(format!(
-        "states no direction, and axis {} of the volume goes along {} in the world; save it as NRRD or NIfTI",
+        "states no direction, and axis {} of the volume goes along {} in the world; save it as .nrrd, .mha, .nii or .nii.gz",
         AXES[axis],
         grid.index_to_world().matrix3.col(axis) / grid.spacing()[axis]
     ))

@@ -111,6 +111,19 @@ fn spaces_become_left_posterior_superior() {
 }
 
 #[test]
+fn each_axis_has_its_unit() {
+    let opened = |more: &str| read(&header("uchar", &format!("encoding: raw\n{more}")), &[0; 24], &NoFiles).unwrap();
+    for more in [
+        "space dimension: 3\nspace directions: (1,0,0) (0,1,0) (0,0,2)\nspace units: \"um\" \"micron\" \"mm\"",
+        "spacings: 1 1 2\nunits: \"um\" \"\" \"mm\"",
+    ] {
+        let opened = opened(more);
+        assert_eq!((opened.volume.grid().spacing(), opened.unit.as_deref()), (DVec3::new(1.0, 1.0, 2e3), Some("um")));
+        assert!(opened.notes.is_empty());
+    }
+}
+
+#[test]
 fn without_directions_spacings_and_bounds_count() {
     let placed = |more: &str| read(&header("uchar", &format!("encoding: raw\n{more}")), &[0; 24], &NoFiles).unwrap();
     let opened = placed("spacings: 1 NaN 0.5\naxis mins: 10 20 nan\naxis maxs: nan 26 nan");

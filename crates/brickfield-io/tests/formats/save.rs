@@ -6,7 +6,7 @@ use brickfield_core::glam::{DMat3, DQuat, DVec3, EulerRot, UVec3};
 use brickfield_core::{Grid, Rescale, Volume, Voxels};
 #[cfg(feature = "nifti")]
 use brickfield_io::nifti;
-use brickfield_io::{Compression, Opened, SaveOptions, WorldFrame, open, save};
+use brickfield_io::{Compression, Opened, SaveOptions, WorldFrame, check_save_path, open, save};
 use proptest::prelude::*;
 
 use crate::common::options;
@@ -173,7 +173,9 @@ fn the_end_of_the_name_is_the_format() {
     for name in ["volume.tif", "volume", ".nrrd", "nrrd"] {
         assert!(refusal(name).ends_with("the end of the name is none of .nrrd, .mha, .nii, .nii.gz, .zarr and .raw"));
     }
-    assert!(refusal("no folder/volume.nrrd").contains("cannot write"));
+    let message = refusal("none/volume.nrrd");
+    let folders = (folder.path().join("none/volume.nrrd"), folder.path().join("none"));
+    assert_eq!(message, format!("{}: there is no folder {}", folders.0.display(), folders.1.display()));
     assert_eq!(folder.path().read_dir().unwrap().count(), 0);
 }
 
@@ -185,7 +187,9 @@ fn ome_zarr_is_whole_or_not_at_all() {
     let turned = DMat3::from_cols(DVec3::Y, DVec3::X, DVec3::Z);
     let message = save(&path, &small(turned), &SaveOptions::default()).unwrap_err().to_string();
     assert!(
-        message.ends_with("axis x of the volume goes along [0, 1, 0] in the world; save it as NRRD or NIfTI"),
+        message.ends_with(
+            "axis x of the volume goes along [0, 1, 0] in the world; save it as .nrrd, .mha, .nii or .nii.gz"
+        ),
         "{message}"
     );
     assert_eq!(folder.path().read_dir().unwrap().count(), 0);
@@ -193,7 +197,11 @@ fn ome_zarr_is_whole_or_not_at_all() {
     check(&small(DMat3::IDENTITY), "volume.zarr", &SaveOptions::default()).unwrap();
     save(&path, &small(DMat3::IDENTITY), &SaveOptions::default()).unwrap();
     let message = save(&path, &small(DMat3::IDENTITY), &SaveOptions::default()).unwrap_err().to_string();
-    assert!(message.contains("volume.zarr: cannot write: entity already exists"), "{message}");
+    assert!(
+        message.contains("volume.zarr: there is one already, and a folder is not replaced; remove it"),
+        "{message}"
+    );
+    assert_eq!(check_save_path(&path).unwrap_err().to_string(), message);
     assert_eq!(folder.path().read_dir().unwrap().count(), 1);
 }
 

@@ -1,10 +1,12 @@
 //! `brickfield convert`.
 
-use brickfield::io::{Compression, SaveOptions, save};
+use brickfield::io::{Compression, SaveOptions, check_save_path, save};
 
 use crate::{ConvertArgs, Failure, print};
 
 pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
+    // As `render`: a path that can be refused is refused before any work is done.
+    check_save_path(&args.out).map_err(Failure::usage)?;
     let opened = args.input.open(&args.file)?;
     opened.notes.iter().for_each(|note| eprintln!("note: {note}"));
     let mut options = SaveOptions::default();
