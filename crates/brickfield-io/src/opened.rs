@@ -1,7 +1,7 @@
 //! The result of a reader.
 
 use brickfield_core::glam::DVec3;
-use brickfield_core::{Grid, Rescale, Volume, Voxels};
+use brickfield_core::{Grid, Rescale, ValueRange, Volume, Voxels};
 
 use crate::choice::{Choices, Chosen, Entries};
 use crate::{Choice, ChoiceKind, Format, Note, OpenOptions, ReadError};
@@ -110,7 +110,12 @@ impl FileFacts {
         };
         let volume = Volume::rescaled(grid, voxels, rescale)?;
         if volume.non_finite().total() > 0 {
-            self.notes.push(Note::NonFinite(volume.non_finite()));
+            // The least number of the file has the greatest value if the slope is below 0.
+            let (low, high) = match volume.range() {
+                ValueRange { min, max } if rescale.slope() < 0.0 => (max, min),
+                ValueRange { min, max } => (min, max),
+            };
+            self.notes.push(Note::NonFinite { counts: volume.non_finite(), low, high });
         }
         let FileFacts { format, frame, unit, notes, choices, .. } = self;
         Ok(Opened { volume, format, frame, unit, notes, choices: choices.finish()? })

@@ -137,11 +137,11 @@ fn without_directions_spacings_and_bounds_count() {
 
 #[test]
 fn not_finite_values_are_noted() {
-    let data = format!("nan inf {}", "0 ".repeat(22));
+    let data = format!("nan inf -3 {}", "2 ".repeat(21));
     let opened = read(&header("float", "encoding: text"), data.as_bytes(), &NoFiles).unwrap();
     assert_eq!(
         opened.notes[0].to_string(),
-        "2 voxels are not finite (1 NaN, 1 +infinity, 0 -infinity) and were replaced"
+        "2 voxels are not finite and were replaced: 1 NaN and 0 -infinity by -3, 1 +infinity by 2"
     );
 }
 
