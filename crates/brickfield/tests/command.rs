@@ -59,6 +59,12 @@ fn scripts_read_json() {
     assert_eq!((&said["type"], &said["values"]["max"]), (&"u8".into(), &250.0.into()));
     assert_eq!(said["spacing"], serde_json::json!([2.0, 2.0, 3.0]));
     assert_eq!(said["first_sample"], serde_json::json!([1.0, 1.0, 1.5]));
+    assert_eq!(said["world"], serde_json::json!({ "min": [0.0, 0.0, 0.0], "max": [24.0, 20.0, 24.0] }));
+    assert_eq!((&said["rendering"], &said["bricks"]["side"]), (&serde_json::json!([]), &32.into()));
+    let level = serde_json::json!({
+        "level": 0, "dimensions": [12, 10, 8], "bricks": 1, "stored_bytes": 32768, "shared_bytes": 0
+    });
+    assert_eq!(said["bricks"]["levels"], serde_json::json!([level]));
 }
 
 #[test]
@@ -230,12 +236,20 @@ fn bricks_that_show_nothing_are_boxes_only_if_all_are_asked_for() {
 }
 
 /// Arguments after `render`, the status, and what the message must hold.
-const REFUSED: [(&str, i32, &str); 34] = [
+const REFUSED: [(&str, i32, &str); 37] = [
     ("b.nrrd|-o|a.png", 1, "b.nrrd"),
     ("a.nrrd|-o|a.jpg", 2, "a.jpg: pictures are written as .exr or .png"),
     ("a.nrrd|-o|no/a.png", 2, "no/a.png: there is no folder no"),
     ("a.nrrd|-o|a.png|--backend|metal", 2, "\"metal\": there are cpu, wgpu and ash"),
     ("a.nrrd|-o|a.png|--backend|cpu|--adapter|none such", 3, "none such"),
+    // Before backends are looked for.
+    ("a.nrrd|-o|a.png|--backend|cpu|--adapter|none such|--transfer|no.json", 2, "--transfer: \"no.json\""),
+    (
+        "a.nrrd|-o|a.png|--backend|cpu|--adapter|none such|--camera|eye=1,1,1 target=1,1,1",
+        2,
+        "--camera: the camera's eye",
+    ),
+    ("a.nrrd|-o|a.png|--backend|cpu|--adapter|none such|--lengths|nominal|--rule|gauss2", 2, "--lengths nominal"),
     ("a.nrrd|-o|a.png|--step|-1", 2, "above 0"),
     ("a.nrrd|-o|a.png|--step|nan", 2, "above 0"),
     ("a.nrrd|-o|a.png|--step|1e-9", 2, "segments"),
