@@ -79,8 +79,9 @@ struct ConvertArgs {
 
 fn convert_help() -> String {
     format!(
-        "Volume to write; the end of its name is the format: one of {SAVED_EXTENSIONS}. A .zarr must not be there yet, and \
-         cannot state axes that are flipped or rotated against the world's; .raw has samples alone"
+        "Volume to write; the end of its name is the format: one of {SAVED_EXTENSIONS}. .nii is NIfTI-1 unless \
+         its 32-bit numbers would be seen, then NIfTI-2; .zarr must not be there yet, and cannot state axes that are flipped \
+         or rotated against the world's; .raw has samples alone"
     )
 }
 
