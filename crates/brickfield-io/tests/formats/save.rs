@@ -168,7 +168,11 @@ fn small(direction: DMat3) -> Volume {
 fn the_end_of_the_name_is_the_format() {
     let folder = tempfile::tempdir().unwrap();
     let refusal = |name: &str| {
-        save(&folder.path().join(name), &small(DMat3::IDENTITY), &SaveOptions::default()).unwrap_err().to_string()
+        let path = folder.path().join(name);
+        let message = save(&path, &small(DMat3::IDENTITY), &SaveOptions::default()).unwrap_err().to_string();
+        // The same before the volume is there.
+        assert_eq!(check_save_path(&path).unwrap_err().to_string(), message);
+        message
     };
     for name in ["volume.tif", "volume", ".nrrd", "nrrd"] {
         assert!(refusal(name).ends_with("the end of the name is none of .nrrd, .mha, .nii, .nii.gz, .zarr and .raw"));
@@ -176,6 +180,7 @@ fn the_end_of_the_name_is_the_format() {
     let message = refusal("none/volume.nrrd");
     let folders = (folder.path().join("none/volume.nrrd"), folder.path().join("none"));
     assert_eq!(message, format!("{}: there is no folder {}", folders.0.display(), folders.1.display()));
+    check_save_path(&folder.path().join("volume.nrrd")).unwrap();
     assert_eq!(folder.path().read_dir().unwrap().count(), 0);
 }
 
