@@ -79,6 +79,6 @@ pub fn save(path: &Path, volume: &Volume, order: ByteOrder) -> Result<Saved, Sav
     let spec = RawSpec { order, spacing: grid.spacing(), ..RawSpec::new(grid.dims(), voxels.scalar_type()) };
     let stated = Stated { frame: WorldFrame::Plain, unit: false };
     let mut saved = Saved::of(Format::Raw, volume, spec.scalar, &SaveOptions::default(), stated);
-    saved.notes.push(SaveNote::SamplesAlone { spec });
+    saved.notes.push(SaveNote::SamplesAlone { spec: spec.to_string() });
     Ok(saved)
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use brickfield_core::{ScalarType, Volume};
 
-use crate::{Format, RawSpec, SaveOptions, WorldFrame};
+use crate::{Format, SaveOptions, WorldFrame};
 
 /// A saved file: the type of its samples, and notes that the user ought to know.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,8 +27,8 @@ pub enum SaveNote {
     FrameLost { format: Format, frame: WorldFrame, read_as: WorldFrame },
     /// The format has no words for the unit of lengths; they are the same numbers.
     UnitLost { format: Format, unit: String },
-    /// Nothing but samples was written: this is what a reader must be told.
-    SamplesAlone { spec: RawSpec },
+    /// Nothing but samples was written; `spec` is what `brickfield --raw` must be told.
+    SamplesAlone { spec: String },
     /// NIfTI-2 was written, which many programs do not open.
     Nifti2 { reason: String },
 }

@@ -5,6 +5,7 @@
 
 mod write;
 
+use write::UNITS;
 pub use write::{save, write};
 
 use std::collections::BTreeMap;
@@ -33,7 +34,7 @@ use crate::{ByteOrder, ChoiceKind, DataFiles, Format, Note, OpenOptions, Opened,
 /// Reads a MetaImage from its header on; `files` finds detached data.
 ///
 /// The world is the file's own. It is [`WorldFrame::Lps`] if the header has an AnatomicalOrientation, for that is what
-/// ITK takes it to be. `Offset` is the first sample's centre; row i of TransformMatrix is the direction of axis i.
+/// ITK takes it to be, unless a key of our own (`brickfield_frame`) says otherwise. `Offset` is the first sample's centre; row i of TransformMatrix is the direction of axis i.
 ///
 /// # Errors
 /// As [`ReadError`] lists them: a header that is wrong, unsupported or beyond the limits; data that are missing.
@@ -67,9 +68,6 @@ struct MetaHeader {
 }
 
 const MAX_AXES: usize = 10;
-
-/// The units of length that MetaIO knows.
-const UNITS: [&str; 3] = ["um", "mm", "cm"];
 
 /// Keys with which a MetaImage header begins, in lower case.
 const FIRST_KEYS: [&str; 8] =
@@ -236,11 +234,10 @@ impl MetaHeader {
 
     fn frame(&self) -> WorldFrame {
         let stated = self.text(&[WorldFrame::KEY]).and_then(WorldFrame::of_name);
-        match self.text(&["anatomicalorientation"]) {
-            _ if stated.is_some() => stated.unwrap_or_default(),
+        stated.unwrap_or_else(|| match self.text(&["anatomicalorientation"]) {
             Some(text) if !text.contains('?') && !text.is_empty() => WorldFrame::Lps,
             _ => WorldFrame::Plain,
-        }
+        })
     }
 }
 

@@ -7,7 +7,6 @@ use std::path::Path;
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Grid, ScalarType, Volume};
 
-use super::UNITS;
 #[cfg(feature = "gzip")]
 use crate::Compression;
 use crate::length_unit::unit_among;
@@ -47,6 +46,9 @@ pub fn write(mut out: impl Write, volume: &Volume, options: &SaveOptions) -> io:
     let stated = Stated { frame: options.frame, unit: unit(options).is_some() };
     Ok(Saved::of(Format::MetaImage, volume, voxels.scalar_type(), options, stated))
 }
+
+/// The units of length that MetaIO knows.
+pub(super) const UNITS: [&str; 3] = ["um", "mm", "cm"];
 
 fn unit(options: &SaveOptions) -> Option<&'static str> {
     unit_among(options.unit.as_deref()?, &UNITS)

@@ -26,7 +26,7 @@ use crate::stored_type::StoredType;
 use crate::stored_voxel::StoredVoxel;
 use crate::wrapped::{encoding_of, open_part};
 use crate::{ChoiceKind, DataFiles, Format, Note, OpenOptions, Opened, ReadError, WorldFrame};
-use header::NiftiHeader;
+use header::{NiftiHeader, UNITS};
 
 /// Reads a NIfTI file from its header on. The image of a pair is `files`' `{stem}.img` or `{stem}.img.gz`.
 ///
@@ -161,9 +161,6 @@ fn by_qform(header: &NiftiHeader, spacing: DVec3) -> Option<GridPlacement> {
     let steps = rotation * DMat3::from_diagonal(spacing * DVec3::new(1.0, 1.0, mirror));
     Some(GridPlacement { first_sample, steps })
 }
-
-/// nifti1.h: the units of length, from code 1 on.
-const UNITS: [&str; 3] = ["m", "mm", "um"];
 
 fn unit(header: &NiftiHeader) -> Option<String> {
     let code = usize::try_from(header.units & 7).ok()?;

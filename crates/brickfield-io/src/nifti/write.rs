@@ -4,9 +4,9 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use brickfield_core::glam::{DVec3, DVec4, UVec3};
-use brickfield_core::{Aabb, Rescale, ScalarType, ValueRange, Volume};
+use brickfield_core::{Rescale, ScalarType, ValueRange, Volume};
 
-use super::UNITS;
+use super::header::UNITS;
 use crate::length_unit::unit_among;
 use crate::placement::{AXES, is_upright};
 use crate::save_note::Stated;
@@ -128,11 +128,10 @@ impl Statements {
 
     fn keep_place_in_f32(&self) -> bool {
         let dims = UVec3::from(self.dims).as_dvec3();
-        let errors = self.rows.map(|row| DVec4::from(row.map(f32_error)));
-        let shift = |corner: DVec3| DVec3::from(errors.map(|row| row.dot(corner.extend(1.0)))).length();
-        let moves_little = |corner| shift(corner) <= MAX_SHIFT * self.spacing.min_element();
+        // No corner moves by more than the errors of all its terms together.
+        let shift = DVec3::from(self.rows.map(|row| DVec4::from(row.map(f32_error)).dot(dims.extend(1.0))));
         let keeps_length = |axis| f32_error(self.spacing[axis]) * dims[axis] <= MAX_SHIFT * self.spacing[axis];
-        Aabb { min: DVec3::ZERO, max: dims }.corners().into_iter().all(moves_little) && (0..3).all(keeps_length)
+        shift.length() <= MAX_SHIFT * self.spacing.min_element() && (0..3).all(keeps_length)
     }
 
     fn keep_values_in_f32(&self, values: ValueRange) -> bool {
