@@ -14,7 +14,11 @@ pub(crate) struct ForeignFormat {
     pub(crate) hint: &'static str,
 }
 
-const READ_FORMATS: &str = "NRRD, MetaImage, NIfTI, VTI, legacy VTK, DICOM, OME-Zarr, TIFF are";
+const READ_FORMATS: &str =
+    "NRRD, MetaImage, NIfTI, MGH, VTI, legacy VTK, DICOM, OME-Zarr, TIFF and folders of TIFF or PNG slices are";
+/// A PNG is one slice.
+const PNG: ForeignFormat =
+    ForeignFormat { name: "a single PNG", hint: "a stack of slices opens as a folder: name the folder instead" };
 const MINC_1: ForeignFormat =
     ForeignFormat { name: "MINC 1 (NetCDF)", hint: "convert it to NIfTI (MINC tools: mnc2nii in.mnc out.nii)" };
 const MINC_2: ForeignFormat =
@@ -29,9 +33,8 @@ const HDF5_MAGIC: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 
 /// The format of a file that begins like this; the extension tells MINC from what it is made of.
 pub(crate) fn foreign(head: &[u8], path: &Path) -> Option<ForeignFormat> {
-    const MAGICS: [(&[u8], &str); 7] = [
+    const MAGICS: [(&[u8], &str); 6] = [
         (b" BDV", "OpenVDB"),
-        (b"\x89PNG", "PNG"),
         (b"\xff\xd8\xff", "JPEG"),
         (b"VOLS\n", "SDSC VOL"),
         (b"VOLB\n", "SDSC VOL"),
@@ -41,6 +44,7 @@ pub(crate) fn foreign(head: &[u8], path: &Path) -> Option<ForeignFormat> {
     let is_minc = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mnc"));
     match head {
         [b'C', b'D', b'F', 1 | 2 | 5, ..] => return Some(if is_minc { MINC_1 } else { NETCDF }),
+        [0x89, b'P', b'N', b'G', ..] => return Some(PNG),
         [0x89, b'H', b'D', b'F', ..] => return Some(hdf5(path)),
         _ => {}
     }

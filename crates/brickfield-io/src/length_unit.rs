@@ -1,4 +1,4 @@
-//! Units of length by name, and axes whose lengths have different ones.
+//! Units of length by name, for readers and writers, and axes whose lengths have different ones.
 //!
 //! The names of OME-XML (UnitsLength of 2016-06), of OME-Zarr (UDUNITS-2), and those that ImageJ users write.
 
@@ -29,6 +29,12 @@ pub(crate) fn common_unit(units: [Option<&str>; 3], notes: &mut Vec<Note>) -> Co
     note_unknown(units.map(|unit| unit.filter(|u| Length::of_unit(u).is_none())), notes);
     let name = common.and_then(|i| units[i]).or_else(|| units.into_iter().flatten().next());
     CommonUnit { name: name.map(str::to_owned), factors: DVec3::from(known.map(factor)) }
+}
+
+/// The one of `names` that names the same length: what a format calls a unit.
+pub(crate) fn unit_among<'n>(unit: &str, names: &[&'n str]) -> Option<&'n str> {
+    let length = Length::of_unit(unit)?;
+    names.iter().copied().find(|name| Length::of_unit(name) == Some(length))
 }
 
 /// One note for each unknown unit.
@@ -170,6 +176,15 @@ mod tests {
         for name in ["pixel", "reference frame", "", "MM", "second", "ms", "voxels", "meterm"] {
             assert_eq!(in_metres(name), None, "{name}");
         }
+    }
+
+    #[test]
+    fn a_unit_is_found_by_any_of_its_names() {
+        let names = ["m", "mm", "um"];
+        for unit in ["\u{b5}m", "\u{3bc}m", "micron", "Micrometer", "um"] {
+            assert_eq!(unit_among(unit, &names), Some("um"), "{unit}");
+        }
+        assert_eq!((unit_among("nm", &names), unit_among("pixel", &names)), (None, None));
     }
 
     #[test]

@@ -16,7 +16,6 @@ mod foreign;
 mod format;
 #[cfg(any(feature = "dicom", feature = "ome-zarr", feature = "tiff", feature = "png", feature = "vti"))]
 mod guard;
-#[cfg(any(feature = "ome-zarr", feature = "tiff"))]
 mod length_unit;
 mod limits;
 mod lines;
@@ -47,6 +46,7 @@ mod rescale;
 mod runs;
 mod samples;
 mod save;
+mod save_note;
 mod saved;
 mod series;
 mod stored;
@@ -72,7 +72,8 @@ pub use open::{detect, open, open_raw};
 pub use opened::{Opened, WorldFrame};
 pub use options::OpenOptions;
 pub use raw::RawSpec;
-pub use save::save;
+pub use save::{check_save_path, save};
+pub use save_note::{SaveNote, Saved};
 pub use saved::{Compression, SAVED_EXTENSIONS, SaveError, SaveOptions};
 
 /// The stored types that can be read, for messages.

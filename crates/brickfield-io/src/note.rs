@@ -12,8 +12,9 @@ use crate::error::{Shown, counted};
 #[non_exhaustive]
 #[allow(missing_docs)]
 pub enum Note {
-    /// Voxels that were not finite and have been replaced.
-    NonFinite(NonFinite),
+    /// Voxels that were not finite and have been replaced: +infinity by the greatest finite number of the file, the others by
+    /// the least; `low` and `high` are their values.
+    NonFinite { counts: NonFinite, low: f64, high: f64 },
     /// Slices that are not evenly spaced. `positions` are the distances from the first slice along the stack, in
     /// world units; the grid has the median step, and voxels are as in the file.
     UnevenSpacing { positions: Vec<f64>, min_step: f64, median_step: f64, max_step: f64, max_shift: f64 },
@@ -41,6 +42,8 @@ pub enum Note {
     DuplicateSlices { n_slices: usize },
     /// Files of a folder that are not slices, or damaged slices of other series.
     FilesSkipped { n_files: usize, first: String, reason: String },
+    /// The numbers of pictures leave some out; their slices are stacked without a gap.
+    NumbersMissing { n_missing: u64, before: String, after: String },
     /// Slices without usable positions of their own; their step is what this element states.
     StepStated { from: &'static str, step: f64 },
     /// A table from stored values to the modality's unit (DICOM Modality LUT); the stored values were kept.
@@ -66,14 +69,14 @@ pub enum Note {
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Note::NonFinite(n) => write!(
+            Note::NonFinite { counts: n, low, high } => write!(
                 f,
-                "{} not finite ({} NaN, {} +infinity, {} -infinity) and {} replaced",
+                "{} not finite and {} replaced: {} NaN and {} -infinity by {low}, {} +infinity by {high}",
                 counted(n.total(), "voxel is", "voxels are"),
+                were(n.total()),
                 n.n_nan,
-                n.n_positive_infinity,
                 n.n_negative_infinity,
-                were(n.total())
+                n.n_positive_infinity
             ),
             Note::UnevenSpacing { positions, min_step, median_step, max_step, max_shift } => write!(
                 f,
@@ -114,6 +117,14 @@ impl fmt::Display for Note {
                 let files = counted(n_files, "file is no slice of this volume", "files are no slices of this volume");
                 let which = if *n_files == 1 { "" } else { "first " };
                 write!(f, "{files} and {} skipped, {which}{first:?}: {reason}", were(*n_files))
+            }
+            Note::NumbersMissing { n_missing, before, after } => {
+                let pictures = counted(n_missing, "picture is", "pictures are");
+                let first = if *n_missing == 1 { "" } else { "first " };
+                write!(
+                    f,
+                    "by the numbers of the names {pictures} missing, {first}between {before:?} and {after:?}; the slices are stacked without a gap"
+                )
             }
             Note::StepStated { from, step } => {
                 write!(f, "slices state no positions of their own; their step {step:.4} comes from {from}")

@@ -1,7 +1,7 @@
 //! The result of a reader.
 
 use brickfield_core::glam::DVec3;
-use brickfield_core::{Grid, Rescale, Volume, Voxels};
+use brickfield_core::{Grid, Rescale, ValueRange, Volume, Voxels};
 
 use crate::choice::{Choices, Chosen, Entries};
 use crate::{Choice, ChoiceKind, Format, Note, OpenOptions, ReadError};
@@ -36,6 +36,32 @@ pub enum WorldFrame {
     #[default]
     /// The axes mean what the file's author meant: VTK, raw, and files without orientation.
     Plain,
+}
+
+impl WorldFrame {
+    /// The key under which a file states its frame, where its format has no words for it but keys of one's own.
+    pub(crate) const KEY: &str = "brickfield_frame";
+    const NAMES: [(WorldFrame, &str); 3] =
+        [(WorldFrame::Lps, "lps"), (WorldFrame::Pictures, "pictures"), (WorldFrame::Plain, "plain")];
+
+    /// The name in files.
+    pub(crate) fn name(self) -> &'static str {
+        WorldFrame::NAMES.into_iter().find(|(frame, _)| *frame == self).map_or("", |(_, name)| name)
+    }
+
+    /// The frame of a name in files.
+    pub(crate) fn of_name(name: &str) -> Option<WorldFrame> {
+        WorldFrame::NAMES.into_iter().find(|(_, known)| name.trim() == *known).map(|(frame, _)| frame)
+    }
+
+    /// The directions of the axes, for messages.
+    pub(crate) fn axes(self) -> &'static str {
+        match self {
+            WorldFrame::Lps => "+x left, +y back, +z head",
+            WorldFrame::Pictures => "+x right, +y down, +z into the stack",
+            WorldFrame::Plain => "axes without meaning",
+        }
+    }
 }
 
 /// The parts of [`Opened`] before the volume is made.
@@ -84,7 +110,12 @@ impl FileFacts {
         };
         let volume = Volume::rescaled(grid, voxels, rescale)?;
         if volume.non_finite().total() > 0 {
-            self.notes.push(Note::NonFinite(volume.non_finite()));
+            // The least number of the file has the greatest value if the slope is below 0.
+            let (low, high) = match volume.range() {
+                ValueRange { min, max } if rescale.slope() < 0.0 => (max, min),
+                ValueRange { min, max } => (min, max),
+            };
+            self.notes.push(Note::NonFinite { counts: volume.non_finite(), low, high });
         }
         let FileFacts { format, frame, unit, notes, choices, .. } = self;
         Ok(Opened { volume, format, frame, unit, notes, choices: choices.finish()? })

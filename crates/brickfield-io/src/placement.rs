@@ -68,4 +68,17 @@ pub(crate) fn usable_spacing(stated: f64, axis: char, notes: &mut Vec<Note>) -> 
     1.0
 }
 
+/// Whether an axis of the volume goes in another direction than that of the world.
+#[cfg(any(feature = "nifti", feature = "ome-zarr"))]
+pub(crate) fn is_turned(grid: &Grid, axis: usize) -> bool {
+    let (spacing, step) = (grid.spacing()[axis], grid.index_to_world().matrix3.col(axis));
+    (step - DVec3::AXES[axis] * spacing).length() > 1e-9 * spacing
+}
+
+/// Whether the axes of the volume are those of the world, each in its direction.
+#[cfg(feature = "nifti")]
+pub(crate) fn is_upright(grid: &Grid) -> bool {
+    (0..3).all(|axis| !is_turned(grid, axis))
+}
+
 pub(crate) const AXES: [char; 3] = ['x', 'y', 'z'];

@@ -1,5 +1,6 @@
 //! Raw voxels: a file that says nothing about itself, so the caller does.
 
+use std::fmt;
 use std::io::{BufRead, Seek};
 use std::path::Path;
 
@@ -9,9 +10,10 @@ use brickfield_core::{ScalarType, Volume};
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
 use crate::placement::GridPlacement;
+use crate::save_note::Stated;
 use crate::saved::{SaveError, save_atomically, values, write_samples};
 use crate::stored::{ByteSkip, DataFile, Encoding, StoredSamples};
-use crate::{ByteOrder, Format, OpenOptions, Opened, ReadError};
+use crate::{ByteOrder, Format, OpenOptions, Opened, ReadError, SaveNote, SaveOptions, Saved, WorldFrame};
 
 /// The numbers that a raw file does not state.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +37,21 @@ impl RawSpec {
     }
 }
 
+/// As `brickfield --raw` takes it.
+impl fmt::Display for RawSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (dims, spacing) = (self.dims, self.spacing);
+        write!(f, "{}x{}x{},{}", dims.x, dims.y, dims.z, self.scalar)?;
+        if self.order == ByteOrder::Big {
+            f.write_str(",big")?;
+        }
+        if self.skip_bytes > 0 {
+            write!(f, ",skip={}", self.skip_bytes)?;
+        }
+        write!(f, ",spacing={}:{}:{}", spacing.x, spacing.y, spacing.z)
+    }
+}
+
 /// Reads raw voxels. The outer corner of the first voxel is the world's origin.
 ///
 /// # Errors
@@ -51,10 +68,17 @@ pub fn read(mut input: impl BufRead + Seek, spec: &RawSpec, options: &OpenOption
     found.finish(grid, voxels)
 }
 
-/// Saves the voxels alone, x fastest: whole or not at all, for the file is renamed into place.
+/// Saves the values alone, x fastest: whole or not at all, for the file is renamed into place.
 ///
 /// # Errors
 /// If the folder cannot be written to.
-pub fn save(path: &Path, volume: &Volume, order: ByteOrder) -> Result<(), SaveError> {
-    save_atomically(path, |out| write_samples(out, &values(volume), order))
+pub fn save(path: &Path, volume: &Volume, order: ByteOrder) -> Result<Saved, SaveError> {
+    let voxels = values(volume);
+    save_atomically(path, |out| write_samples(out, &voxels, order))?;
+    let grid = volume.grid();
+    let spec = RawSpec { order, spacing: grid.spacing(), ..RawSpec::new(grid.dims(), voxels.scalar_type()) };
+    let stated = Stated { frame: WorldFrame::Plain, unit: false };
+    let mut saved = Saved::of(Format::Raw, volume, spec.scalar, &SaveOptions::default(), stated);
+    saved.notes.push(SaveNote::SamplesAlone { spec: spec.to_string() });
+    Ok(saved)
 }

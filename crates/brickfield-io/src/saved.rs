@@ -45,6 +45,12 @@ pub enum SaveError {
     Io { path: PathBuf, source: io::Error },
     #[error("{}: the end of the name is none of {SAVED_EXTENSIONS}", path.display())]
     UnknownExtension { path: PathBuf },
+    #[error("{}: there is no folder {}", path.display(), folder.display())]
+    NoFolder { path: PathBuf, folder: PathBuf },
+    #[error("{}: it is a folder", path.display())]
+    IsFolder { path: PathBuf },
+    #[error("{}: there is one already, and a folder is not replaced; remove it, or take another name", path.display())]
+    IsThere { path: PathBuf },
     #[error("{}: {format} {fault}", path.display())]
     Unsupported { path: PathBuf, format: Format, fault: String },
 }
@@ -68,10 +74,10 @@ pub(crate) fn values(volume: &Volume) -> Cow<'_, Voxels> {
 }
 
 /// Writes to a temporary file in the same folder, and renames it into place when it is complete and on disk.
-pub(crate) fn save_atomically(
+pub(crate) fn save_atomically<T>(
     path: &Path,
-    write: impl FnOnce(&mut BufWriter<&mut tempfile::NamedTempFile>) -> io::Result<()>,
-) -> Result<(), SaveError> {
+    write: impl FnOnce(&mut BufWriter<&mut tempfile::NamedTempFile>) -> io::Result<T>,
+) -> Result<T, SaveError> {
     save_renaming(path, write).map_err(|source| SaveError::Io { path: path.to_owned(), source })
 }
 
@@ -83,13 +89,19 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
     }
 }
 
+/// Whether a file can be made in the folder that this one lies in.
+pub(crate) fn check_folder_of(path: &Path) -> Result<(), SaveError> {
+    let draft = tempfile::Builder::new().prefix(UNFINISHED).tempfile_in(folder_of(path));
+    draft.map(drop).map_err(|source| SaveError::Io { path: path.to_owned(), source })
+}
+
 /// How the names of unfinished files and folders begin.
 pub(crate) const UNFINISHED: &str = ".brickfield-";
 
-fn save_renaming(
+fn save_renaming<T>(
     path: &Path,
-    write: impl FnOnce(&mut BufWriter<&mut tempfile::NamedTempFile>) -> io::Result<()>,
-) -> io::Result<()> {
+    write: impl FnOnce(&mut BufWriter<&mut tempfile::NamedTempFile>) -> io::Result<T>,
+) -> io::Result<T> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(UNFINISHED);
     // The mode of an ordinary file (before the umask), not the private mode of temporary files.
@@ -97,11 +109,11 @@ fn save_renaming(
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut file = builder.tempfile_in(folder_of(path))?;
     let mut out = BufWriter::with_capacity(1 << 16, &mut file);
-    write(&mut out)?;
+    let saved = write(&mut out)?;
     out.flush()?;
     drop(out);
     file.as_file().sync_all()?;
-    file.persist(path).map(|_| ()).map_err(|e| e.error)
+    file.persist(path).map(|_| saved).map_err(|e| e.error)
 }
 
 /// Writes all voxels, x fastest.

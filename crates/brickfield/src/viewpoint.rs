@@ -117,6 +117,17 @@ impl Viewpoint {
         Camera::look_at(eye, center, up, perspective)
     }
 
+    /// Refuses what is wrong for any volume.
+    ///
+    /// # Errors
+    /// The errors of [`Camera::look_at`].
+    pub fn check(&self) -> Result<(), CameraError> {
+        let (Some(eye), Some(target)) = (self.eye, self.target) else { return Ok(()) };
+        // The direction that is up by default depends on the volume.
+        let any_up = (target - eye).try_normalize().map_or(DVec3::Y, DVec3::any_orthogonal_vector);
+        Camera::look_at(eye, target, self.up.unwrap_or(any_up), Projection::Orthographic { height: 1.0 }).map(drop)
+    }
+
     fn checked(self) -> Result<Viewpoint, ViewpointError> {
         if self.from.is_some() && self.eye.is_some() {
             return Err(ViewpointError::Both { first: "from", second: "eye" });

@@ -59,6 +59,12 @@ fn scripts_read_json() {
     assert_eq!((&said["type"], &said["values"]["max"]), (&"u8".into(), &250.0.into()));
     assert_eq!(said["spacing"], serde_json::json!([2.0, 2.0, 3.0]));
     assert_eq!(said["first_sample"], serde_json::json!([1.0, 1.0, 1.5]));
+    assert_eq!(said["world"], serde_json::json!({ "min": [0.0, 0.0, 0.0], "max": [24.0, 20.0, 24.0] }));
+    assert_eq!((&said["rendering"], &said["bricks"]["side"]), (&serde_json::json!([]), &32.into()));
+    let level = serde_json::json!({
+        "level": 0, "dimensions": [12, 10, 8], "bricks": 1, "stored_bytes": 32768, "shared_bytes": 0
+    });
+    assert_eq!(said["bricks"]["levels"], serde_json::json!([level]));
 }
 
 #[test]
@@ -71,6 +77,9 @@ fn rescaled_integers_take_the_bytes_of_integers() {
     let said: serde_json::Value = serde_json::from_slice(&place.run("info|b.nii|--json").stdout).unwrap();
     assert_eq!((&said["type"], &said["bytes"]), (&"u8".into(), &960.into()));
     assert_eq!(said["values"], serde_json::json!({ "min": -1024.0, "max": -899.0 }));
+    let out = place.run("convert|b.nii|-o|b.mha");
+    assert_eq!(text(&out.stdout), "b.mha: 12 x 10 x 8 voxels of f32\n");
+    assert!(text(&out.stderr).contains("note: MetaImage stores no slope and intercept"), "{}", text(&out.stderr));
     let bricks = |file: &str| {
         let out = place.run(&format!("render|{file}|-o|{file}.png|{SMALL}"));
         let said = text(&out.stdout);
@@ -90,9 +99,16 @@ fn a_volume_is_saved_in_another_format() {
         let saved = open(&place.path().join(name), &OpenOptions::default()).unwrap();
         assert_eq!(saved.volume.voxels(), original.volume.voxels(), "{name}");
     }
-    let refused = place.run("convert|a.nrrd|-o|b.tif");
-    assert_eq!(refused.status.code(), Some(1));
-    assert!(text(&refused.stderr).contains("the end of the name is none of .nrrd"), "{}", text(&refused.stderr));
+    for (out, part) in [
+        ("b.tif", "b.tif: the end of the name is none of .nrrd"),
+        ("no/b.nrrd", "no/b.nrrd: there is no folder no"),
+        ("b.zarr", "b.zarr: there is one already, and a folder is not replaced; remove it, or take another name"),
+    ] {
+        // Before the input is looked for.
+        let refused = place.run(&format!("convert|none.nrrd|-o|{out}"));
+        assert_eq!(refused.status.code(), Some(2), "{out}");
+        assert!(text(&refused.stderr).contains(part), "{}", text(&refused.stderr));
+    }
     let refused = place.run("info|a.nrrd|--channel|2");
     assert!(text(&refused.stderr).contains("channel is \"2\"; expected 0"), "{}", text(&refused.stderr));
 }
@@ -220,12 +236,20 @@ fn bricks_that_show_nothing_are_boxes_only_if_all_are_asked_for() {
 }
 
 /// Arguments after `render`, the status, and what the message must hold.
-const REFUSED: [(&str, i32, &str); 34] = [
+const REFUSED: [(&str, i32, &str); 37] = [
     ("b.nrrd|-o|a.png", 1, "b.nrrd"),
     ("a.nrrd|-o|a.jpg", 2, "a.jpg: pictures are written as .exr or .png"),
     ("a.nrrd|-o|no/a.png", 2, "no/a.png: there is no folder no"),
     ("a.nrrd|-o|a.png|--backend|metal", 2, "\"metal\": there are cpu, wgpu and ash"),
     ("a.nrrd|-o|a.png|--backend|cpu|--adapter|none such", 3, "none such"),
+    // Before backends are looked for.
+    ("a.nrrd|-o|a.png|--backend|cpu|--adapter|none such|--transfer|no.json", 2, "--transfer: \"no.json\""),
+    (
+        "a.nrrd|-o|a.png|--backend|cpu|--adapter|none such|--camera|eye=1,1,1 target=1,1,1",
+        2,
+        "--camera: the camera's eye",
+    ),
+    ("a.nrrd|-o|a.png|--backend|cpu|--adapter|none such|--lengths|nominal|--rule|gauss2", 2, "--lengths nominal"),
     ("a.nrrd|-o|a.png|--step|-1", 2, "above 0"),
     ("a.nrrd|-o|a.png|--step|nan", 2, "above 0"),
     ("a.nrrd|-o|a.png|--step|1e-9", 2, "segments"),

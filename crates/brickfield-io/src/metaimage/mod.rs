@@ -5,6 +5,7 @@
 
 mod write;
 
+use write::UNITS;
 pub use write::{save, write};
 
 use std::collections::BTreeMap;
@@ -19,6 +20,7 @@ use crate::detached::{Promised, read_detached};
 use crate::error::{Shown, counted};
 use crate::file_list::FileNames;
 use crate::files::ByteSource;
+use crate::length_unit::unit_among;
 use crate::limits::{CheckedShape, n_samples};
 use crate::lines::{HeaderLines, numbers};
 use crate::opened::FileFacts;
@@ -32,7 +34,7 @@ use crate::{ByteOrder, ChoiceKind, DataFiles, Format, Note, OpenOptions, Opened,
 /// Reads a MetaImage from its header on; `files` finds detached data.
 ///
 /// The world is the file's own. It is [`WorldFrame::Lps`] if the header has an AnatomicalOrientation, for that is what
-/// ITK takes it to be. `Offset` is the first sample's centre; row i of TransformMatrix is the direction of axis i.
+/// ITK takes it to be, unless a key of our own (`brickfield_frame`) says otherwise. `Offset` is the first sample's centre; row i of TransformMatrix is the direction of axis i.
 ///
 /// # Errors
 /// As [`ReadError`] lists them: a header that is wrong, unsupported or beyond the limits; data that are missing.
@@ -54,7 +56,7 @@ fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenO
         Some(names) => read_detached(names, promised, &shape, &stored, files, &mut found.notes)?,
         None => stored.read(source, &promised.attached(&shape), &shape, &mut found.notes)?,
     };
-    found.frame = header.frame();
+    (found.frame, found.unit) = (header.frame(), header.unit());
     found.finish(grid, voxels)
 }
 
@@ -226,11 +228,16 @@ impl MetaHeader {
         }
     }
 
+    fn unit(&self) -> Option<String> {
+        unit_among(self.text(&["distanceunits"])?, &UNITS).map(str::to_owned)
+    }
+
     fn frame(&self) -> WorldFrame {
-        match self.text(&["anatomicalorientation"]) {
+        let stated = self.text(&[WorldFrame::KEY]).and_then(WorldFrame::of_name);
+        stated.unwrap_or_else(|| match self.text(&["anatomicalorientation"]) {
             Some(text) if !text.contains('?') && !text.is_empty() => WorldFrame::Lps,
             _ => WorldFrame::Plain,
-        }
+        })
     }
 }
 

@@ -9,22 +9,24 @@ use brickfield_core::{Grid, ScalarType, Volume};
 
 #[cfg(feature = "gzip")]
 use crate::Compression;
+use crate::length_unit::unit_among;
+use crate::save_note::Stated;
 use crate::saved::{save_atomically, values, write_samples};
-use crate::{ByteOrder, SaveError, SaveOptions, WorldFrame};
+use crate::{ByteOrder, Format, SaveError, SaveOptions, Saved, WorldFrame};
 
 /// Saves a volume as attached MetaImage (`.mha`): whole or not at all, for the file is renamed into place.
 ///
 /// # Errors
 /// If the folder cannot be written to.
-pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<(), SaveError> {
+pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<Saved, SaveError> {
     save_atomically(path, |out| write(out, volume, options))
 }
 
-/// Writes a volume as attached MetaImage, little-endian. MetaImage states no unit.
+/// Writes a volume as attached MetaImage, little-endian. Of units it states um, mm and cm. A frame of pictures is a key of our own.
 ///
 /// # Errors
 /// The errors of `out`.
-pub fn write(mut out: impl Write, volume: &Volume, options: &SaveOptions) -> io::Result<()> {
+pub fn write(mut out: impl Write, volume: &Volume, options: &SaveOptions) -> io::Result<Saved> {
     let voxels = values(volume);
     let packed: Option<Vec<u8>> = match options.compression {
         #[cfg(feature = "gzip")]
@@ -36,14 +38,23 @@ pub fn write(mut out: impl Write, volume: &Volume, options: &SaveOptions) -> io:
         _ => None,
     };
     let n_packed = packed.as_ref().map(Vec::len);
-    out.write_all(header(volume.grid(), voxels.scalar_type(), options.frame, n_packed).as_bytes())?;
+    out.write_all(header(volume.grid(), voxels.scalar_type(), options, n_packed).as_bytes())?;
     match packed {
-        Some(packed) => out.write_all(&packed),
-        None => write_samples(&mut out, &voxels, ByteOrder::Little),
+        Some(packed) => out.write_all(&packed)?,
+        None => write_samples(&mut out, &voxels, ByteOrder::Little)?,
     }
+    let stated = Stated { frame: options.frame, unit: unit(options).is_some() };
+    Ok(Saved::of(Format::MetaImage, volume, voxels.scalar_type(), options, stated))
 }
 
-fn header(grid: &Grid, scalar: ScalarType, frame: WorldFrame, n_packed: Option<usize>) -> String {
+/// The units of length that MetaIO knows.
+pub(super) const UNITS: [&str; 3] = ["um", "mm", "cm"];
+
+fn unit(options: &SaveOptions) -> Option<&'static str> {
+    unit_among(options.unit.as_deref()?, &UNITS)
+}
+
+fn header(grid: &Grid, scalar: ScalarType, options: &SaveOptions, n_packed: Option<usize>) -> String {
     let map = grid.index_to_world();
     let (spacing, first_sample) = (grid.spacing(), map.transform_point3(DVec3::splat(0.5)));
     let directions = [0, 1, 2].map(|axis| map.matrix3.col(axis) / spacing[axis]);
@@ -56,9 +67,14 @@ fn header(grid: &Grid, scalar: ScalarType, frame: WorldFrame, n_packed: Option<u
         Some(n) => text += &format!("CompressedData = True\nCompressedDataSize = {n}\n"),
         None => text += "CompressedData = False\n",
     }
-    if frame == WorldFrame::Lps {
+    text += &match options.frame {
         // The letters of the directions in which the axes of the identity go.
-        text += "AnatomicalOrientation = RAI\n";
+        WorldFrame::Lps => "AnatomicalOrientation = RAI\n".to_owned(),
+        WorldFrame::Pictures => format!("{} = {}\n", WorldFrame::KEY, options.frame.name()),
+        WorldFrame::Plain => String::new(),
+    };
+    if let Some(unit) = unit(options) {
+        text += &format!("DistanceUnits = {unit}\n");
     }
     let dims = grid.dims();
     let _ = write!(

@@ -29,6 +29,9 @@ pub(super) struct NiftiHeader {
     pub(super) units: i32,
 }
 
+/// nifti1.h: the units of length, from code 1 on.
+pub(super) const UNITS: [&str; 3] = ["m", "mm", "um"];
+
 const N_BYTES_1: usize = 348;
 const N_BYTES_2: usize = 540;
 

@@ -26,7 +26,7 @@ use crate::stored_type::StoredType;
 use crate::stored_voxel::StoredVoxel;
 use crate::wrapped::{encoding_of, open_part};
 use crate::{ChoiceKind, DataFiles, Format, Note, OpenOptions, Opened, ReadError, WorldFrame};
-use header::NiftiHeader;
+use header::{NiftiHeader, UNITS};
 
 /// Reads a NIfTI file from its header on. The image of a pair is `files`' `{stem}.img` or `{stem}.img.gz`.
 ///
@@ -163,11 +163,6 @@ fn by_qform(header: &NiftiHeader, spacing: DVec3) -> Option<GridPlacement> {
 }
 
 fn unit(header: &NiftiHeader) -> Option<String> {
-    let name = match header.units & 7 {
-        1 => "m",
-        2 => "mm",
-        3 => "um",
-        _ => return None,
-    };
-    Some(name.to_owned())
+    let code = usize::try_from(header.units & 7).ok()?;
+    UNITS.get(code.checked_sub(1)?).map(|name| (*name).to_owned())
 }

@@ -25,7 +25,8 @@ use space::Space;
 /// Reads an NRRD from its header on; `files` finds detached data.
 ///
 /// Spaces left-posterior-superior, right-anterior-superior and left-anterior-superior become
-/// [`WorldFrame::Lps`](crate::WorldFrame::Lps); others stay as they are. `space origin` is the first sample's centre.
+/// [`WorldFrame::Lps`](crate::WorldFrame::Lps); others stay as they are, and a key of our own (`brickfield_frame`) says that axes
+/// are those of pictures. `space origin` is the first sample's centre.
 ///
 /// # Errors
 /// As [`ReadError`] lists them: a header that is wrong, unsupported or beyond the limits; data that are missing.

@@ -4,6 +4,7 @@ use brickfield_core::glam::DVec3;
 
 use super::header::NrrdHeader;
 use crate::error::counted;
+use crate::length_unit::{CommonUnit, common_unit};
 use crate::placement::{AXES, GridPlacement, usable_spacing};
 use crate::{Note, ReadError, WorldFrame};
 
@@ -30,7 +31,8 @@ impl Space {
             Some(directions) => oriented(header, directions, &axes)?,
             None => by_spacings(header, &axes, notes)?,
         };
-        Ok(Space { dims, placement: placement.scaled(factors), frame, unit: unit(header, &axes), axes })
+        let CommonUnit { name: unit, factors: to_common } = common_unit(units(header, &axes), notes);
+        Ok(Space { dims, placement: placement.scaled(factors * to_common), frame, unit, axes })
     }
 }
 
@@ -88,14 +90,15 @@ fn volume_axes(header: &NrrdHeader, directions: &Option<Directions>) -> Vec<usiz
 
 /// The frame, and the factors that bring the file's axes to it.
 fn frame_of(header: &NrrdHeader) -> (WorldFrame, DVec3) {
+    let stated = header.key(WorldFrame::KEY).and_then(WorldFrame::of_name);
     let space = header.text("space").unwrap_or("").to_ascii_lowercase();
     let factors = match space.trim_end_matches("-time").trim_end_matches('t') {
         "left-posterior-superior" | "lps" => DVec3::ONE,
         "right-anterior-superior" | "ras" => DVec3::new(-1.0, -1.0, 1.0),
         "left-anterior-superior" | "las" => DVec3::new(1.0, -1.0, 1.0),
-        _ => return (WorldFrame::Plain, DVec3::ONE),
+        _ => return (stated.unwrap_or(WorldFrame::Plain), DVec3::ONE),
     };
-    (WorldFrame::Lps, factors)
+    (stated.unwrap_or(WorldFrame::Lps), factors)
 }
 
 fn oriented(header: &NrrdHeader, directions: &Directions, axes: &[usize]) -> Result<GridPlacement, ReadError> {
@@ -145,12 +148,12 @@ fn per_axis(header: &NrrdHeader, name: &str, field: &'static str) -> Result<Opti
     Ok(Some(values))
 }
 
-/// The first unit that a volume axis states, without its quotes.
-fn unit(header: &NrrdHeader, axes: &[usize]) -> Option<String> {
-    let quoted = |text: &str, i: usize| text.split('"').nth(2 * i + 1).map(str::trim).map(str::to_owned);
-    let unit = match header.text("spaceunits") {
-        Some(text) => quoted(text, 0),
-        None => quoted(header.text("units")?, *axes.first()?),
+/// The units along the axes of the world, as far as they are stated, without their quotes.
+fn units<'h>(header: &'h NrrdHeader, axes: &[usize]) -> [Option<&'h str>; 3] {
+    let quoted = |text: &'h str, i: usize| text.split('"').nth(2 * i + 1).map(str::trim);
+    let unit = |i: usize| match header.text("spaceunits") {
+        Some(text) => quoted(text, i),
+        None => quoted(header.text("units")?, *axes.get(i)?),
     };
-    unit.filter(|u| !u.is_empty() && u != "???")
+    [0, 1, 2].map(|i| unit(i).filter(|unit| !unit.is_empty() && *unit != "???"))
 }

@@ -133,6 +133,7 @@ fn multiscale(
     let path = joined(group, checked_path(path, "datasets/path")?);
     let array = ArrayMetadata::read(store, &path)?;
     let image = ZarrImage::of_multiscale(path, multiscale, dataset, node.ome())?;
+    found.frame = node.frame().unwrap_or(found.frame);
     Ok((image, array))
 }
 

@@ -33,7 +33,7 @@ use chunks::Part;
 ///
 /// Axes are found by name (x, y, z), or are the last ones of a plain array (z, y, x). Channels and times are choices; of
 /// any other axis the first entry is read. The world is the file's own: the scale is the spacing, the translation is the
-/// first sample's centre. Chunks that are not stored have the fill value.
+/// first sample's centre; its frame is that of pictures, unless an attribute of our own (`brickfield_frame`) says otherwise. Chunks that are not stored have the fill value.
 ///
 /// # Errors
 /// As [`ReadError`] lists them: metadata that are wrong, unsupported or beyond the limits; chunks that cannot be decoded.

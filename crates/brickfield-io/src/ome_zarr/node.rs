@@ -4,8 +4,8 @@ use serde_json::Value;
 use zarrs::storage::{ListableStorageTraits, ReadableStorage, StorePrefix};
 
 use super::json::read_json;
-use crate::ReadError;
 use crate::files::stays_within;
+use crate::{ReadError, WorldFrame};
 
 pub(super) struct Node {
     pub(super) is_array: bool,
@@ -34,6 +34,11 @@ impl Node {
             Value::Null => &self.attributes,
             ome => ome,
         }
+    }
+
+    /// The frame, under a key of our own.
+    pub(super) fn frame(&self) -> Option<WorldFrame> {
+        WorldFrame::of_name(self.attributes[WorldFrame::KEY].as_str()?)
     }
 
     /// The names of an array's axes that Zarr v2 writers agreed upon.

@@ -11,8 +11,11 @@ use zarrs::array::{Array, ArraySubset, CodecOptions};
 use zarrs::filesystem::FilesystemStore;
 use zarrs::storage::ReadableWritableListableStorage;
 
+use crate::length_unit::unit_among;
+use crate::placement::{AXES, is_turned};
+use crate::save_note::Stated;
 use crate::saved::{UNFINISHED, folder_of, values};
-use crate::{Compression, Format, SaveError, SaveOptions};
+use crate::{Compression, Format, SaveError, SaveOptions, Saved, WorldFrame};
 
 /// Samples along a chunk's side.
 const CHUNK_SIDE: u32 = 64;
@@ -22,40 +25,37 @@ const CHUNK_SIDE: u32 = 64;
 /// # Errors
 /// If there is something of this name; if the volume's axes are not those of the world, for OME-Zarr states spacing and
 /// translation only; if the folder cannot be written to.
-pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<(), SaveError> {
+pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<Saved, SaveError> {
     let fault = |source| SaveError::Io { path: path.to_owned(), source };
-    if let Err(turned) = upright(volume.grid()) {
-        return Err(SaveError::Unsupported { path: path.to_owned(), format: Format::OmeZarr, fault: turned });
+    if let Some(fault) = turned(volume.grid()) {
+        return Err(SaveError::Unsupported { path: path.to_owned(), format: Format::OmeZarr, fault });
     }
     if path.exists() {
-        return Err(fault(io::ErrorKind::AlreadyExists.into()));
+        return Err(SaveError::IsThere { path: path.to_owned() });
     }
     let unfinished = tempfile::Builder::new().prefix(UNFINISHED).tempdir_in(folder_of(path)).map_err(fault)?;
     let folder = unfinished.path().join("image");
-    write(&folder, volume, options).map_err(|e| fault(io::Error::other(e)))?;
-    fs::rename(&folder, path).map_err(fault)
+    let scalar = write(&folder, volume, options).map_err(|e| fault(io::Error::other(e)))?;
+    fs::rename(&folder, path).map_err(fault)?;
+    let stated = Stated { frame: options.frame, unit: true };
+    Ok(Saved::of(Format::OmeZarr, volume, scalar, options, stated))
 }
 
-/// Whether the axes of the volume are those of the world, each in its direction.
-fn upright(grid: &Grid) -> Result<(), String> {
-    let map = grid.index_to_world().matrix3;
-    let turned =
-        |axis: usize| (map.col(axis) - DVec3::AXES[axis] * grid.spacing()[axis]).length() > 1e-9 * grid.spacing()[axis];
-    match (0..3).find(|axis| turned(*axis)) {
-        Some(axis) => Err(format!(
-            "states no direction, and axis {} of the volume goes along {} in the world; save it as NRRD or NIfTI",
-            ['x', 'y', 'z'][axis],
-            map.col(axis) / grid.spacing()[axis]
-        )),
-        None => Ok(()),
-    }
+/// The fault of a volume whose axes are not those of the world.
+fn turned(grid: &Grid) -> Option<String> {
+    let axis = (0..3).find(|axis| is_turned(grid, *axis))?;
+    Some(format!(
+        "states no direction, and axis {} of the volume goes along {} in the world; save it as .nrrd, .mha, .nii or .nii.gz",
+        AXES[axis],
+        grid.index_to_world().matrix3.col(axis) / grid.spacing()[axis]
+    ))
 }
 
 fn write(
     folder: &Path,
     volume: &Volume,
     options: &SaveOptions,
-) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+) -> Result<ScalarType, Box<dyn std::error::Error + Send + Sync>> {
     fs::create_dir(folder)?;
     fs::write(folder.join("zarr.json"), serde_json::to_vec_pretty(&group(volume.grid(), options))?)?;
     let voxels = values(volume);
@@ -76,7 +76,7 @@ fn write(
         Voxels::F32(v) => array.store_array_subset_opt(&all, &v[..], &whole)?,
         Voxels::F64(v) => array.store_array_subset_opt(&all, &v[..], &whole)?,
     }
-    Ok(())
+    Ok(voxels.scalar_type())
 }
 
 /// The metadata of the image.
@@ -97,24 +97,52 @@ fn group(grid: &Grid, options: &SaveOptions) -> Value {
         "axes": axes,
         "datasets": [{ "path": "0", "coordinateTransformations": transformations }]
     });
+    let mut attributes = json!({ "ome": { "version": "0.5", "multiscales": [image] } });
+    // OME-Zarr 0.5 has no words for a frame; without any, readers have one of pictures.
+    if options.frame != WorldFrame::Pictures {
+        attributes[WorldFrame::KEY] = options.frame.name().into();
+    }
     json!({
         "zarr_format": 3,
         "node_type": "group",
-        "attributes": { "ome": { "version": "0.5", "multiscales": [image] } }
+        "attributes": attributes
     })
 }
 
-/// OME-Zarr spells units out.
+/// The names of units of length (OME-Zarr 0.5, "axes" metadata).
+const UNITS: [&str; 26] = [
+    "angstrom",
+    "attometer",
+    "centimeter",
+    "decimeter",
+    "exameter",
+    "femtometer",
+    "foot",
+    "gigameter",
+    "hectometer",
+    "inch",
+    "kilometer",
+    "megameter",
+    "meter",
+    "micrometer",
+    "mile",
+    "millimeter",
+    "nanometer",
+    "parsec",
+    "petameter",
+    "picometer",
+    "terameter",
+    "yard",
+    "yoctometer",
+    "yottameter",
+    "zeptometer",
+    "zettameter",
+];
+
+/// The unit, spelled out.
 fn unit(options: &SaveOptions) -> Option<&str> {
-    Some(match options.unit.as_deref()? {
-        "m" => "meter",
-        "cm" => "centimeter",
-        "mm" => "millimeter",
-        "um" | "µm" => "micrometer",
-        "nm" => "nanometer",
-        "pm" => "picometer",
-        other => other,
-    })
+    let unit = options.unit.as_deref()?;
+    Some(unit_among(unit, &UNITS).unwrap_or(unit))
 }
 
 /// The metadata of the array.

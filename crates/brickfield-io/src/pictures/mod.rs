@@ -62,6 +62,10 @@ fn read_from(names: &[String], files: &dyn DataFiles, options: &OpenOptions) -> 
         opened.notes.extend(found.notes);
         return Ok(opened);
     }
+    if let Some((n_missing, at)) = order::missing_numbers(&names) {
+        let (before, after) = (names[at].to_owned(), names[at + 1].to_owned());
+        found.notes.push(Note::NumbersMissing { n_missing, before, after });
+    }
     let first = Slice::open(kind, names[0], files, &options.limits)?;
     let like = first.shape();
     first.shown().into_iter().for_each(|shown| found.notes.push(Note::AsStored { shown }));

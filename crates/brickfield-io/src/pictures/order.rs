@@ -42,6 +42,35 @@ impl<'a> Iterator for Pieces<'a> {
     }
 }
 
+/// The numbers that a list of names in natural order leaves out, if the names differ in one number only: how many, and the
+/// index of the name before the first. The least step is the one that is expected.
+pub(super) fn missing_numbers(names: &[&str]) -> Option<(u64, usize)> {
+    let numbers = counting_numbers(names)?;
+    let steps: Vec<u64> = numbers.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).collect();
+    let least = steps.iter().copied().min().filter(|least| *least > 0)?;
+    let missing = |step: u64| (step - 1) / least;
+    let first = steps.iter().position(|step| missing(*step) > 0)?;
+    Some((steps.into_iter().map(missing).fold(0, u64::saturating_add), first))
+}
+
+/// The one number in which the names differ.
+fn counting_numbers(names: &[&str]) -> Option<Vec<u64>> {
+    let pieces: Vec<Vec<Piece>> = names.iter().map(|name| Pieces(name).collect()).collect();
+    let first = pieces.first()?;
+    let differs = |at: usize| pieces.iter().any(|other| other[at] != first[at]);
+    if pieces.iter().any(|other| other.len() != first.len()) {
+        return None;
+    }
+    let mut differing = (0..first.len()).filter(|at| differs(*at));
+    let (at, None) = (differing.next()?, differing.next()) else { return None };
+    let number = |pieces: &Vec<Piece>| match pieces[at] {
+        Piece::Number(0, _) => Some(0),
+        Piece::Number(_, digits) => digits.parse().ok(),
+        Piece::Character(_) => None,
+    };
+    pieces.iter().map(number).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -56,5 +85,27 @@ mod tests {
         assert_eq!(names, sorted);
         assert_eq!(natural_order("", ""), Ordering::Equal);
         assert_eq!(natural_order("slice2.tif", "Slice10.TIF"), Ordering::Less);
+    }
+
+    #[test]
+    fn numbers_that_are_left_out_are_counted() {
+        let missing = |names: &[&str]| missing_numbers(names);
+        assert_eq!(missing(&["s0.png", "s1.png", "s4.png", "s5.png", "s7.png"]), Some((3, 1)));
+        assert_eq!(missing(&["2020 s08", "2020 s10", "2020 s14"]), Some((1, 1)));
+        for whole in [
+            &["1.tif", "2.tif", "3.tif"][..],
+            &["010", "020", "030"],
+            // Nothing to compare with, no numbers, two that count, the same number twice.
+            &["1.tif", "9.tif"],
+            &["1.tif"],
+            &[],
+            &["a", "b", "d"],
+            &["t1 z1", "t1 z2", "t2 z4"],
+            &["1a", "1b", "3a"],
+            &["1.tif", "01.tif", "3.tif"],
+            &["1", "99999999999999999999999"],
+        ] {
+            assert_eq!(missing(whole), None, "{whole:?}");
+        }
     }
 }

@@ -167,6 +167,15 @@ fn foreign_formats_folders_and_missing_files() {
     let folder = tempfile::tempdir().unwrap();
     let vdb = refusal(&write(folder.path(), "v.vdb", b" BDV\0\0\0\0"), &options());
     assert!(vdb.contains("format \"OpenVDB\" is not supported"), "{vdb}");
+    for format in ["MGH", "OME-Zarr", "folders of TIFF or PNG slices"] {
+        assert!(vdb.contains(format), "{vdb}");
+    }
+    let png = refusal(&write(folder.path(), "3.png", b"\x89PNG\r\n\x1a\n"), &options());
+    assert!(
+        png.ends_with(
+            "\"a single PNG\" is not supported; a stack of slices opens as a folder: name the folder instead"
+        )
+    );
     let raw = refusal(&write(folder.path(), "v.raw", b"\x01\x02"), &options());
     assert!(raw.contains("open_raw"), "{raw}");
     std::fs::create_dir(folder.path().join("empty")).unwrap();

@@ -111,6 +111,19 @@ fn spaces_become_left_posterior_superior() {
 }
 
 #[test]
+fn each_axis_has_its_unit() {
+    let opened = |more: &str| read(&header("uchar", &format!("encoding: raw\n{more}")), &[0; 24], &NoFiles).unwrap();
+    for more in [
+        "space dimension: 3\nspace directions: (1,0,0) (0,1,0) (0,0,2)\nspace units: \"um\" \"micron\" \"mm\"",
+        "spacings: 1 1 2\nunits: \"um\" \"\" \"mm\"",
+    ] {
+        let opened = opened(more);
+        assert_eq!((opened.volume.grid().spacing(), opened.unit.as_deref()), (DVec3::new(1.0, 1.0, 2e3), Some("um")));
+        assert!(opened.notes.is_empty());
+    }
+}
+
+#[test]
 fn without_directions_spacings_and_bounds_count() {
     let placed = |more: &str| read(&header("uchar", &format!("encoding: raw\n{more}")), &[0; 24], &NoFiles).unwrap();
     let opened = placed("spacings: 1 NaN 0.5\naxis mins: 10 20 nan\naxis maxs: nan 26 nan");
@@ -124,11 +137,11 @@ fn without_directions_spacings_and_bounds_count() {
 
 #[test]
 fn not_finite_values_are_noted() {
-    let data = format!("nan inf {}", "0 ".repeat(22));
+    let data = format!("nan inf -3 {}", "2 ".repeat(21));
     let opened = read(&header("float", "encoding: text"), data.as_bytes(), &NoFiles).unwrap();
     assert_eq!(
         opened.notes[0].to_string(),
-        "2 voxels are not finite (1 NaN, 1 +infinity, 0 -infinity) and were replaced"
+        "2 voxels are not finite and were replaced: 1 NaN and 0 -infinity by -3, 1 +infinity by 2"
     );
 }
 

@@ -57,6 +57,15 @@ mod of_png {
     }
 
     #[test]
+    fn a_gap_in_the_numbers_is_noted() {
+        let files: Files = [1, 2, 5, 6].map(|i| named(&format!("z{i}.png"), grey(&[i, i]))).into();
+        let said: Vec<_> = read(&files).unwrap().notes.iter().map(ToString::to_string).collect();
+        let note = "by the numbers of the names 2 pictures are missing, first between \"z2.png\" and \"z5.png\"; the slices are \
+                    stacked without a gap";
+        assert_eq!(said, [note]);
+    }
+
+    #[test]
     fn other_files_are_skipped_with_a_note() {
         let files: Files = [
             named("1.png", grey(&[1, 2])),
@@ -137,7 +146,7 @@ mod of_tiff {
 
     #[test]
     fn slices_are_in_the_order_of_their_numbers() {
-        let files: Files = [("z10.TIF", 3), ("z9.tif", 2), ("Z2.tif", 1)]
+        let files: Files = [("z10.TIF", 3), ("z9.tif", 2), ("Z8.tif", 1)]
             .map(|(name, value)| named(name, tiff(&[page(value)])))
             .into();
         let opened = read(&files).unwrap();

@@ -114,6 +114,13 @@ fn presets() -> String {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Background(pub LinearRgb);
 
+/// A transfer function as far as it is known before the volume is.
+enum NamedTransfer {
+    Automatic,
+    Preset(Preset),
+    OfFile(TransferFunction),
+}
+
 /// Which bricks are shown as boxes over a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Boxes {
@@ -285,20 +292,37 @@ impl TreeOptions {
 }
 
 impl ViewOptions {
+    /// Refuses what is wrong for any volume.
+    ///
+    /// # Errors
+    /// A transfer function that cannot be had, or a camera that looks nowhere.
+    pub fn check(&self) -> Result<(), OptionError> {
+        self.named_transfer()?;
+        Ok(self.camera.check()?)
+    }
+
     /// The transfer function that is asked for.
     ///
     /// # Errors
     /// An unknown name, or what is wrong in the file.
     pub fn transfer(&self, volume: &Volume) -> Result<TransferFunction, OptionError> {
+        Ok(match self.named_transfer()? {
+            NamedTransfer::Automatic => brickfield_optics::automatic(volume),
+            NamedTransfer::Preset(preset) => preset.for_volume(volume)?,
+            NamedTransfer::OfFile(transfer) => transfer,
+        })
+    }
+
+    fn named_transfer(&self) -> Result<NamedTransfer, OptionError> {
         if self.transfer == "auto" {
-            return Ok(brickfield_optics::automatic(volume));
+            return Ok(NamedTransfer::Automatic);
         }
         if let Some(preset) = Preset::from_name(&self.transfer) {
-            return Ok(preset.for_volume(volume)?);
+            return Ok(NamedTransfer::Preset(preset));
         }
         let path = PathBuf::from(&self.transfer);
         if path.exists() {
-            return Ok(brickfield_optics::read_transfer(&path)?);
+            return Ok(NamedTransfer::OfFile(brickfield_optics::read_transfer(&path)?));
         }
         Err(OptionError::NoSuchTransfer { name: self.transfer.clone(), presets: presets() })
     }
@@ -362,8 +386,11 @@ impl SamplingOptions {
         QuadratureRule::PreIntegrated
     }
 
-    /// `prepare` refuses the same; here the options are known by name.
-    fn check(&self) -> Result<(), OptionError> {
+    /// Refuses what is wrong for any volume: `prepare` does, too, but here the options are known by name.
+    ///
+    /// # Errors
+    /// Options that exclude each other.
+    pub fn check(&self) -> Result<(), OptionError> {
         let exclude = |first: String, second: String, reason| Err(OptionError::Exclude { first, second, reason });
         let polygons = || format!("--polygons {}", self.polygons.map_or("", Target::name));
         match (self.polygons, self.placement, self.divide, self.lengths, self.rule) {

@@ -12,16 +12,18 @@ use crate::{Failure, InfoArgs, print};
 
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let opened = args.input.open(&args.file)?;
-    if args.json {
-        return print(&format!("{:#}\n", json(&opened)));
-    }
-    let mut text = String::new();
+    let (mut text, mut json) = (String::new(), json(&opened));
     of_volume(&mut text, &opened)?;
     let notes = opened.notes.clone();
     let even = opened.evenly_spaced(&args.input.limits());
-    let mut made = even.notes.iter().filter(|note| !notes.contains(note));
-    made.try_for_each(|note| writeln!(text, "rendering   {note}"))?;
-    of_tree(&mut text, &args.tree.build(&even.volume)?)?;
+    let made = even.notes.iter().filter(|note| !notes.contains(note)).map(ToString::to_string).collect::<Vec<_>>();
+    let tree = args.tree.build(&even.volume)?;
+    if args.json {
+        (json["rendering"], json["bricks"]) = (json!(made), json_of_tree(&tree));
+        return print(&format!("{json:#}\n"));
+    }
+    made.iter().try_for_each(|note| writeln!(text, "rendering   {note}"))?;
+    of_tree(&mut text, &tree)?;
     print(&text)
 }
 
@@ -49,7 +51,7 @@ fn of_volume(text: &mut String, opened: &Opened) -> fmt::Result {
 fn json(opened: &Opened) -> Value {
     let volume = &opened.volume;
     let (grid, range, rescale) = (volume.grid(), volume.range(), volume.rescale());
-    let map = grid.index_to_world();
+    let (map, world) = (grid.index_to_world(), grid.world_box());
     let directions = [0, 1, 2].map(|axis| (map.matrix3.col(axis) / grid.spacing()[axis]).to_array());
     let choice = |choice: &Choice| {
         json!({
@@ -70,9 +72,28 @@ fn json(opened: &Opened) -> Value {
         "unit": opened.unit,
         "first_sample": map.transform_point3(DVec3::splat(0.5)).to_array(),
         "directions": directions,
+        "world": { "min": world.min.to_array(), "max": world.max.to_array() },
         "frame": format!("{:?}", opened.frame),
         "choices": opened.choices.iter().map(choice).collect::<Vec<_>>(),
         "notes": opened.notes.iter().map(|note| note.to_string()).collect::<Vec<_>>(),
+    })
+}
+
+fn json_of_tree(tree: &BrickTree) -> Value {
+    let memory = tree.memory();
+    let level = |(level, memory): (Level, &LevelMemory)| {
+        json!({
+            "level": level.0,
+            "dimensions": tree.layout().level_dims(level).to_array(),
+            "bricks": memory.n_bricks,
+            "stored_bytes": memory.stored_bytes,
+            "shared_bytes": memory.shared_bytes,
+        })
+    };
+    json!({
+        "side": tree.layout().side().n_samples(),
+        "downsampling": format!("{:?}", tree.downsampling()),
+        "levels": (0..).map(Level).zip(&memory.levels).map(level).collect::<Vec<_>>(),
     })
 }
 

@@ -45,7 +45,7 @@ enum Command {
     Info(InfoArgs),
     /// Renders a picture of a volume file
     Render(Box<RenderArgs>),
-    /// Saves a volume in another format: values, spacing and direction survive
+    /// Saves a volume in another format: values, spacing and direction survive; what the format cannot state is noted
     Convert(ConvertArgs),
     /// Lists the backends and their adapters, or why there are none
     Backends,
@@ -78,7 +78,11 @@ struct ConvertArgs {
 }
 
 fn convert_help() -> String {
-    format!("Volume to write; the end of its name is the format: one of {SAVED_EXTENSIONS}")
+    format!(
+        "Volume to write; the end of its name is the format: one of {SAVED_EXTENSIONS}. .nii is NIfTI-1 unless \
+         its 32-bit numbers would be seen, then NIfTI-2; .zarr must not be there yet, and cannot state axes that are flipped \
+         or rotated against the world's; .raw has samples alone"
+    )
 }
 
 #[derive(Args)]

@@ -16,6 +16,8 @@ use crate::{Failure, RenderArgs, print};
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     // Options that can be refused are refused before any work is done.
     check_picture_path(&args.out).map_err(Failure::usage)?;
+    args.view.check()?;
+    args.sampling.check()?;
     let mut backend = open(args)?;
     let subject = Subject::open(&args.file, &args.input, &args.tree, &args.view)?;
     let scene = args.sampling.of(args.view.scene(&subject)?, &subject.volume)?;
