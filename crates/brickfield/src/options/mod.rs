@@ -1,18 +1,21 @@
 //! The options that the `brickfield` command shares with the conformance runs.
 
+mod blocks;
 pub mod values;
 
 use std::path::{Path, PathBuf};
 
 use brickfield_bricks::{BrickTree, BuildOptions, Downsampling, build_tree_observed};
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
-use brickfield_core::{Aabb, BrickSide, Grid, Level, LinearRgb, TransferFunction, Volume};
+use brickfield_core::{Aabb, BlockSide, BrickSide, Grid, Level, LinearRgb, TransferFunction, Volume};
 use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
 use brickfield_io::{ChoiceKind, Limits, OpenOptions, Opened, RawSpec, WorldFrame};
 use brickfield_lod::Criterion;
 use brickfield_optics::{NarrowPeak, Preset, QuadratureRule, narrow_peak};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+
+pub use blocks::{BlockArgs, BlockSubject};
 
 use crate::{Scene, Skipping, Technique, Viewpoint};
 
@@ -187,6 +190,14 @@ pub enum OptionError {
     Open(#[from] brickfield_io::OpenError),
     #[error(transparent)]
     Build(#[from] brickfield_bricks::BuildError),
+    #[error(transparent)]
+    Blocks(#[from] brickfield_bricks::BlockBuildError),
+    #[error(transparent)]
+    BlockErrors(#[from] brickfield_lod::EstimateError),
+    #[error("the blocks' budget: {0}")]
+    Budget(#[from] brickfield_lod::BudgetError),
+    #[error("--block-level {level}: blocks of {side} voxels have levels 0 to {most}")]
+    BlockLevel { level: u8, side: BlockSide, most: u8 },
     #[error("--transfer: {0}")]
     Preset(#[from] brickfield_core::TransferError),
     #[error("--transfer: {0}")]
@@ -206,7 +217,10 @@ impl OptionError {
     pub fn is_usage(&self) -> bool {
         match self {
             OptionError::Open(_) | OptionError::Build(_) | OptionError::Preset(_) | OptionError::Transfer(_) => false,
-            OptionError::NoSuchTransfer { .. }
+            OptionError::Blocks(_) | OptionError::BlockErrors(_) => false,
+            OptionError::Budget(_)
+            | OptionError::BlockLevel { .. }
+            | OptionError::NoSuchTransfer { .. }
             | OptionError::Camera(_)
             | OptionError::ClipOutside { .. }
             | OptionError::Exclude { .. } => true,
@@ -332,23 +346,30 @@ impl ViewOptions {
     /// # Errors
     /// What the camera refuses, or a clip box outside of the volume.
     pub fn scene(&self, subject: &Subject) -> Result<Scene, OptionError> {
-        let (grid, layout) = (subject.tree.grid(), subject.tree.layout());
-        let camera = self.camera.camera(grid, subject.frame, self.size)?;
-        note_missing_levels(&self.lod, layout.root().level);
+        note_missing_levels(&self.lod, subject.tree.layout().root().level);
+        self.scene_of(subject.tree.grid(), subject.frame, &subject.transfer)
+    }
+
+    /// The scene of whatever lies on a grid, sampled as by default.
+    ///
+    /// # Errors
+    /// As [`scene`](Self::scene).
+    pub fn scene_of(&self, grid: &Grid, frame: WorldFrame, transfer: &TransferFunction) -> Result<Scene, OptionError> {
+        let camera = self.camera.camera(grid, frame, self.size)?;
         if let Some(clip) = self.clip {
             check_clip(clip, grid)?;
         }
-        let scene = Scene::new(camera, self.size, subject.transfer.clone());
+        let scene = Scene::new(camera, self.size, transfer.clone());
         Ok(Scene { detail: self.lod.clone(), clip: self.clip, ..scene })
     }
 }
 
 impl SamplingOptions {
-    /// The scene of a volume, sampled as asked for.
+    /// The scene of a volume, sampled as asked for. The default rule depends on the volume, if it is in memory.
     ///
     /// # Errors
     /// Options that exclude each other.
-    pub fn of(&self, scene: Scene, volume: &Volume) -> Result<Scene, OptionError> {
+    pub fn of(&self, scene: Scene, volume: Option<&Volume>) -> Result<Scene, OptionError> {
         self.check()?;
         let rule = self.rule.unwrap_or_else(|| self.default_rule(&scene, volume));
         let tessellated = Placement::TessellatedShells { facet_pixels: values::FACET_PIXELS };
@@ -371,9 +392,9 @@ impl SamplingOptions {
     }
 
     /// The midpoint rule, unless it steps over a peak of the transfer function: then pre-integration, and that is said.
-    fn default_rule(&self, scene: &Scene, volume: &Volume) -> QuadratureRule {
+    fn default_rule(&self, scene: &Scene, volume: Option<&Volume>) -> QuadratureRule {
         let narrow = match self.lengths {
-            Lengths::True => narrow_peak(volume, &scene.transfer, self.step),
+            Lengths::True => volume.and_then(|volume| narrow_peak(volume, &scene.transfer, self.step)),
             // Only the midpoint rule has nominal lengths.
             Lengths::Nominal => None,
         };
