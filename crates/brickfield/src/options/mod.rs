@@ -17,7 +17,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 pub use blocks::{BlockArgs, BlockSubject};
 
-use crate::{Scene, Skipping, Technique, Viewpoint};
+use crate::{Quality, Scene, Skipping, Technique, Viewpoint};
 
 /// How a file is read.
 #[derive(Args, Clone, Debug)]
@@ -163,6 +163,9 @@ pub struct SamplingOptions {
     /// their samples
     #[arg(long, value_name = "TARGET", value_parser = values::target)]
     pub polygons: Option<Target>,
+    /// final, or draft (steps of twice the length, and of flat blocks the nearest one alone): while the camera moves
+    #[arg(long, value_name = "WHICH", default_value = "final", value_parser = values::quality)]
+    pub quality: Quality,
     /// Upload and sample transparent bricks too (to measure what leaving them out saves)
     #[arg(long)]
     pub no_skip: bool,
@@ -386,6 +389,7 @@ impl SamplingOptions {
             division: self.divide.unwrap_or(division),
             lengths: self.lengths,
             technique,
+            quality: self.quality,
             skipping: if self.no_skip { Skipping::Off } else { Skipping::On },
             ..scene
         })

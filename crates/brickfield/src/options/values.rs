@@ -10,7 +10,7 @@ use brickfield_lod::Criterion;
 use brickfield_optics::QuadratureRule;
 
 use super::{Background, Boxes};
-use crate::{MAX_IMAGE, TransparentBlocks};
+use crate::{MAX_IMAGE, Quality, TransparentBlocks};
 
 /// Pixels along a facet of tessellated shells where none are asked for.
 pub const FACET_PIXELS: u32 = 16;
@@ -76,6 +76,15 @@ pub fn join(text: &str) -> Result<Join, String> {
     let scheme = || Interblock::ALL.into_iter().find(|scheme| scheme.name() == text).map(Join::Blend);
     let names = Interblock::ALL.map(Interblock::name).join(", ");
     (text == "nearest").then_some(Join::Shared).or_else(scheme).ok_or_else(|| format!("one of nearest, {names}"))
+}
+
+/// Draft or final.
+pub fn quality(text: &str) -> Result<Quality, String> {
+    match text {
+        "final" => Ok(Quality::Final),
+        "draft" => Ok(Quality::Draft),
+        _ => Err("final or draft".to_owned()),
+    }
 }
 
 /// What is drawn inside transparent blocks.
