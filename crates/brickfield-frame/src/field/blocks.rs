@@ -34,9 +34,8 @@ pub enum BlockSamples {
 
 /// Bits of a texel's coordinates in a row: x, y, z.
 const TEXEL_BITS: [u32; 3] = [11, 11, 10];
-/// Bits of a level in a row, and levels in a word.
+/// Bits of a level in a row.
 const LEVEL_BITS: u32 = 3;
-const LEVELS_OF_WORD: u32 = 10;
 /// In a row's first word: the block is one sample.
 const ONE_SAMPLE: u32 = 1 << 31;
 
@@ -114,8 +113,8 @@ impl BlockPlaces {
 
     /// The rows as shaders read them, four words each.
     ///
-    /// The first three have the levels of the block and its 26 neighbours, ten of three bits each from the lowest: x fastest, the
-    /// block itself is the 14th; a neighbour that is missing has the block's own. The last word is its first texel
+    /// The first three have the levels of the block and its 26 neighbours, one word for each layer of nine along z, x fastest, three
+    /// bits each from the lowest; a neighbour that is missing has the block's own. The last word is its first texel
     /// ([`TEXEL_BITS`] from the lowest), or the sample, if the first word says that it is one.
     pub(super) fn packed(&self) -> Vec<[u32; 4]> {
         let pack = |(block, row): (UVec3, &BlockRow)| {
@@ -129,16 +128,17 @@ impl BlockPlaces {
     }
 
     fn levels_around(&self, block: UVec3) -> [u32; 3] {
-        let (last, mut words) = (self.layout.n_blocks() - 1, [0; 3]);
-        let neighbours = (0..3).flat_map(|z| (0..3).flat_map(move |y| (0..3).map(move |x| UVec3::new(x, y, z))));
-        for (k, offset) in (0..).zip(neighbours) {
+        let last = self.layout.n_blocks() - 1;
+        let level = |offset: UVec3| {
             // One more, so that the one before the first is not negative.
             let at = block + offset;
             let is_there = at.cmpge(UVec3::ONE).all() && at.cmple(last + 1).all();
-            let level = self.row(if is_there { at - 1 } else { block }).level;
-            words[k / LEVELS_OF_WORD as usize] |= u32::from(level.0) << (LEVEL_BITS * (k as u32 % LEVELS_OF_WORD));
-        }
-        words
+            u32::from(self.row(if is_there { at - 1 } else { block }).level.0)
+        };
+        [0, 1, 2].map(|z| {
+            let layer = (0..9).map(|i| level(UVec3::new(i % 3, i / 3, z)) << (LEVEL_BITS * i));
+            layer.fold(0, |word, level| word | level)
+        })
     }
 
     /// Whether all rows are of the layout's blocks, and in the texture.
