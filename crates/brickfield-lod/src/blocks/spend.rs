@@ -69,7 +69,7 @@ pub enum BudgetError {
 /// `errors` and `weights` are by [`BlockLayout::ordinal`]; no weights are equal ones. A weight of 0 leaves a block at one
 /// sample; so do one below 0 and NaN. Errors that are not finite and above 0 count as 0. Every block starts with one sample.
 /// Its steps to finer levels are those of the lower convex hull of cost over bytes; steps of all blocks are taken in the order
-/// of gain per byte, unless they exceed the budget or gain nothing. The cost is then above the least possible by no more than
+/// of gain per byte, unless they exceed the budget or gain nothing; what is left buys parts of these steps. The cost is then above the least possible by no more than
 /// the greatest gain of one step (Dantzig's bound: the steps up to the first that does not fit solve the relaxed problem).
 ///
 /// O(n log n); runs on rayon's current thread pool, and does not depend on the number of threads.
@@ -84,18 +84,35 @@ pub fn select_block_levels(
 ) -> Result<BlockSelection, BudgetError> {
     check_lengths(layout, errors, weights)?;
     let budget_bytes = budget_bytes(layout, budget)?;
-    let priced = |ordinal| price(layout, ordinal, errors[ordinal], weights.map_or(1.0, |w| w[ordinal]), budget);
+    let tariff =
+        |ordinal: usize| Tariff::new(layout, ordinal, errors[ordinal], weights.map_or(1.0, |w| w[ordinal]), budget);
+    let priced = |ordinal| tariff(ordinal).price();
     let (mut n_bytes, mut cost, steps) = start(errors.len(), priced);
     if n_bytes > budget_bytes {
         return Err(BudgetError::TooSmall { n_blocks: errors.len(), needed_bytes: n_bytes, budget_bytes });
     }
     let mut levels = vec![layout.side().one_sample(); errors.len()];
+    let mut refused = Vec::new();
     for step in in_order(&steps) {
         let level = &mut levels[step.block as usize];
-        if *level == step.from && u64::from(step.n_bytes) <= budget_bytes - n_bytes {
-            *level = step.to;
-            n_bytes += u64::from(step.n_bytes);
-            cost -= step.gain;
+        if *level != step.from {
+            continue;
+        }
+        if u64::from(step.n_bytes) > budget_bytes - n_bytes {
+            refused.push(step);
+            continue;
+        }
+        *level = step.to;
+        n_bytes += u64::from(step.n_bytes);
+        cost -= step.gain;
+    }
+    // The rest buys a part of a step that is too dear as a whole.
+    for step in refused {
+        let tariff = tariff(step.block as usize);
+        if let Some(part) = tariff.part_of(step, budget_bytes - n_bytes) {
+            levels[step.block as usize] = part.to;
+            n_bytes += u64::from(part.n_bytes);
+            cost -= part.gain;
         }
     }
     let levels = BlockLevels::of_valid(*layout, levels);
@@ -157,15 +174,49 @@ struct Price {
     steps: [Option<Step>; N_STEPS],
 }
 
-/// The lower convex hull of a block's levels in the plane of bytes and cost.
-fn price(layout: &BlockLayout, ordinal: usize, errors: LevelErrors, weight: f32, budget: &BlockBudget) -> Price {
-    let block = layout.block(ordinal);
-    let per_error = f64::from(finite(weight)) * layout.extent(block).as_dvec3().element_product();
-    let at = |level: Level| {
-        let n = n_samples(layout, block, level);
-        let n = if n == 1 && budget.one_sample == OneSampleBlocks::Free { 0 } else { n };
-        (n * budget.scalar.n_bytes() as u64, per_error * f64::from(finite(errors[usize::from(level.0)])))
-    };
+/// What the levels of a block take, and what they are worth.
+struct Tariff<'a> {
+    layout: &'a BlockLayout,
+    ordinal: usize,
+    /// Cost of each level.
+    costs: [f64; N_LEVELS],
+    budget: &'a BlockBudget,
+}
+
+impl<'a> Tariff<'a> {
+    fn new(layout: &'a BlockLayout, ordinal: usize, errors: LevelErrors, weight: f32, budget: &'a BlockBudget) -> Self {
+        let n_voxels = layout.extent(layout.block(ordinal)).as_dvec3().element_product();
+        let per_error = f64::from(finite(weight)) * n_voxels;
+        Tariff { layout, ordinal, costs: errors.map(|error| per_error * f64::from(finite(error))), budget }
+    }
+
+    /// Bytes and cost of a level.
+    fn at(&self, level: Level) -> (u64, f64) {
+        let n = n_samples(self.layout, self.layout.block(self.ordinal), level);
+        let n = if n == 1 && self.budget.one_sample == OneSampleBlocks::Free { 0 } else { n };
+        (n * self.budget.scalar.n_bytes() as u64, self.costs[usize::from(level.0)])
+    }
+
+    /// The part of a step that gains most for at most so many bytes.
+    fn part_of(&self, step: &Step, n_bytes: u64) -> Option<Step> {
+        let (bytes_before, cost_before) = self.at(step.from);
+        let between = (step.to.0 + 1..step.from.0).map(Level);
+        let parts = between.filter_map(|to| {
+            let (bytes, cost) = self.at(to);
+            let part = Step { to, n_bytes: (bytes - bytes_before) as u32, gain: cost_before - cost, ..*step };
+            (part.gain > 0.0 && u64::from(part.n_bytes) <= n_bytes).then_some(part)
+        });
+        parts.max_by(|a, b| a.gain.total_cmp(&b.gain))
+    }
+
+    /// The lower convex hull of the levels in the plane of bytes and cost.
+    fn price(&self) -> Price {
+        price(self.layout, self.ordinal, |level| self.at(level))
+    }
+}
+
+/// Bytes and cost of one sample, and the steps of the lower convex hull.
+fn price(layout: &BlockLayout, ordinal: usize, at: impl Fn(Level) -> (u64, f64)) -> Price {
     let mut level = layout.side().one_sample();
     let (n_bytes, cost) = at(level);
     let mut price = Price { n_bytes, cost, ..Price::default() };
