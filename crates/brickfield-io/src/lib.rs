@@ -69,7 +69,7 @@ pub use limits::Limits;
 pub use note::Note;
 pub use numbers::ByteOrder;
 pub use open::{detect, open, open_raw};
-pub use opened::{Opened, WorldFrame};
+pub use opened::{Opened, VolumeFacts, WorldFrame};
 pub use options::OpenOptions;
 pub use raw::RawSpec;
 pub use save::{check_save_path, save};

@@ -24,6 +24,8 @@ mod nrrd;
 mod nrrd_axes;
 #[cfg(feature = "ome-zarr")]
 mod ome_zarr;
+#[cfg(feature = "ome-zarr")]
+mod pack;
 #[cfg(any(feature = "tiff", feature = "png"))]
 mod pictures;
 mod raw;
