@@ -16,6 +16,7 @@ mod pack;
 mod write;
 
 pub use levels::ZarrLevels;
+pub(crate) use levels::slices;
 pub use pack::PyramidWriter;
 pub use write::save;
 

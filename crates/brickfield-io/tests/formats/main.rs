@@ -31,6 +31,7 @@ mod pictures;
 mod raw;
 mod save;
 mod seeds;
+mod slices;
 mod stored;
 #[cfg(feature = "tiff")]
 mod tiff;

@@ -2,13 +2,16 @@
 
 mod cache;
 mod parts;
+mod slices;
+
+pub(crate) use slices::slices;
 
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use brickfield_core::glam::{U64Vec3, UVec3};
-use brickfield_core::{BlockLayout, BlockSide, BlockSummary, Rescale, ScalarType};
+use brickfield_core::{BlockLayout, BlockSide, BlockSummary, Rescale, ScalarType, Voxels};
 use zarrs::filesystem::FilesystemStore;
 use zarrs::storage::{ListableStorageTraits, ReadableStorage};
 
@@ -147,6 +150,36 @@ impl ZarrLevels {
     /// How often a chunk was asked for that is not stored; its samples have the fill value.
     pub fn n_missing_chunks(&self) -> u64 {
         self.n_missing.load(Ordering::Relaxed)
+    }
+
+    /// Chunks of the finest level, or parts of shards, that the volume lies in.
+    pub fn n_chunks(&self) -> u64 {
+        let level = &self.levels[0];
+        let n = level.dims.to_array().into_iter().zip(level.along_volume(&level.parts.part_shape));
+        n.map(|(n, part)| u64::from(n).div_ceil(part)).product()
+    }
+
+    /// Bytes of all unpacked chunks that a slice of the finest level lies in.
+    fn layer_bytes(&self) -> u64 {
+        let level = &self.levels[0];
+        let [x, y, _] = level.along_volume(&level.parts.part_shape);
+        let n_parts = u64::from(level.dims.x).div_ceil(x) * u64::from(level.dims.y).div_ceil(y);
+        u64::try_from(level.parts.n_bytes() + 1024).unwrap_or(u64::MAX).saturating_mul(n_parts)
+    }
+
+    /// Whether samples are 64-bit integers.
+    fn is_wide(&self) -> bool {
+        self.levels[0].parts.is_wide()
+    }
+
+    /// The samples of a box of a level, as [`read_box`](Self::read_box) has them.
+    ///
+    /// # Errors
+    /// As [`read_box`](Self::read_box).
+    pub fn box_voxels(&self, level: usize, first: UVec3, extent: UVec3) -> Result<Voxels, ReadError> {
+        let mut bytes = Vec::new();
+        self.read_box(level, first, extent, &mut bytes)?;
+        slices::voxels_of(self.facts.scalar, &bytes)
     }
 
     /// Replaces `out` by the samples of a box of a level: x fastest, little-endian, in the type of the [facts](Self::facts).

@@ -102,6 +102,11 @@ impl Parts {
         matches!(self.packing, Packing::Shard(_))
     }
 
+    /// Whether samples are 64-bit integers.
+    pub(super) fn is_wide(&self) -> bool {
+        matches!(self.stored, StoredType::I64 | StoredType::U64)
+    }
+
     /// The type that samples are read into.
     pub(super) fn scalar(&self) -> ScalarType {
         self.stored.read_into()
