@@ -6,6 +6,7 @@ mod build;
 mod downsample;
 mod fill;
 mod memory;
+mod pyramid;
 mod sample;
 mod tally;
 mod tree;
@@ -13,10 +14,11 @@ mod tree;
 pub use bins::{Bins, Histogram, N_BINS};
 pub use blocks::{
     BlockBuildError, BlockMemory, BlockOptions, BlockSource, BlockTally, BlockVolume, FetchError, NoSuchBlock,
-    SourceId, block_memory, build_blocks, fetch_values,
+    SourceId, block_memory, block_summaries, build_blocks, fetch_values,
 };
 pub use build::{BuildError, BuildOptions, Progress, build_tree, build_tree_observed};
 pub use downsample::Downsampling;
 pub use memory::{LevelMemory, TreeMemory, tree_memory};
+pub use pyramid::{MAX_PYRAMID_LEVEL, Pyramid, SliceError, average_box, coarsest_level, level_dims};
 pub use sample::BrickSamples;
 pub use tree::{BrickSummary, BrickTree, TreeId};

@@ -21,7 +21,7 @@ pub(crate) fn check_ratio(what: &str, n_compressed_bytes: u64, expected_bytes: u
 }
 
 /// The bytes of a gzip or a zlib stream, told apart by the first byte.
-pub(crate) fn inflate<'a, R: BufRead + ?Sized>(source: &'a mut R) -> io::Result<Box<dyn Read + 'a>> {
+pub(crate) fn inflate<'a>(mut source: impl BufRead + 'a) -> io::Result<Box<dyn Read + 'a>> {
     let is_gzip = source.fill_buf()?.first() == Some(&0x1f);
     Ok(match is_gzip {
         true => Box::new(Unpacked(Members { member: Some(GzDecoder::new(source)) })),

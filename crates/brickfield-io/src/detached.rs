@@ -1,5 +1,7 @@
 //! Voxels that lie in one or many files apart from the header.
 
+use std::ops::Range;
+
 use brickfield_core::Voxels;
 
 use crate::error::counted;
@@ -18,10 +20,10 @@ pub(crate) struct Promised {
 }
 
 impl Promised {
-    /// The data that follow the header.
-    pub(crate) fn attached(self, shape: &CheckedShape) -> DataFile<'static> {
+    /// The data in the same file as the header.
+    pub(crate) fn attached(self, name: &'static str, shape: &CheckedShape) -> DataFile<'static> {
         let Promised { n_voxels, n_before } = self;
-        DataFile { name: "the data after the header", n_voxels, n_before, n_wanted: shape.n_voxels() }
+        DataFile { name, n_voxels, n_before, n_wanted: shape.n_voxels() }
     }
 }
 
@@ -36,28 +38,63 @@ pub(crate) fn read_detached(
     files: &dyn DataFiles,
     notes: &mut Vec<Note>,
 ) -> Result<Voxels, ReadError> {
-    let n_per_file = voxels_per_file(names, promised.n_voxels)?;
-    let start = promised.n_before;
-    let end = start + shape.n_voxels() as u128;
-    let parts = || {
-        (start / n_per_file..end.div_ceil(n_per_file)).map(move |i| {
-            let n_before = start.saturating_sub(i * n_per_file);
-            let n_wanted = n_per_file.min(end - i * n_per_file) - n_before;
-            (names.name(i as usize), n_before, n_wanted as usize)
-        })
-    };
-    for (name, n_before, n_wanted) in parts() {
-        let part = DataFile { name: &name, n_voxels: n_per_file, n_before, n_wanted };
-        stored.seek_samples(&mut *open_named(files, &name)?, &part, shape.voxel)?;
-    }
+    let parts = FileParts::new(names, promised, shape)?;
+    parts.check(names, shape, stored, files)?;
     let mut voxels = allocate(shape)?;
-    for (name, n_before, n_wanted) in parts() {
-        let part = DataFile { name: &name, n_voxels: n_per_file, n_before, n_wanted };
+    for i in parts.files() {
+        let name = names.name(i);
+        let part = parts.part(i, &name);
         let mut source = open_named(files, &name)?;
         stored.seek_samples(&mut *source, &part, shape.voxel)?;
         stored.append(&mut voxels, &mut *source, &part, shape, notes)?;
     }
     shape.converted(voxels, notes)
+}
+
+/// Voxels that are spread evenly over files, and which of them are wanted.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FileParts {
+    n_per_file: u128,
+    start: u128,
+    end: u128,
+}
+
+impl FileParts {
+    /// # Errors
+    /// If the voxels cannot be spread evenly over the files.
+    pub(crate) fn new(names: &FileNames, promised: Promised, shape: &CheckedShape) -> Result<FileParts, ReadError> {
+        let n_per_file = voxels_per_file(names, promised.n_voxels)?;
+        let start = promised.n_before;
+        Ok(FileParts { n_per_file, start, end: start + shape.n_voxels() as u128 })
+    }
+
+    /// The numbers of the files with voxels that are wanted.
+    pub(crate) fn files(&self) -> Range<usize> {
+        (self.start / self.n_per_file) as usize..self.end.div_ceil(self.n_per_file) as usize
+    }
+
+    /// What is wanted of a file.
+    pub(crate) fn part<'a>(&self, i: usize, name: &'a str) -> DataFile<'a> {
+        let before_file = i as u128 * self.n_per_file;
+        let n_before = self.start.saturating_sub(before_file);
+        let n_wanted = (self.n_per_file.min(self.end - before_file) - n_before) as usize;
+        DataFile { name, n_voxels: self.n_per_file, n_before, n_wanted }
+    }
+
+    /// Opens and measures all files.
+    pub(crate) fn check(
+        &self,
+        names: &FileNames,
+        shape: &CheckedShape,
+        stored: &StoredSamples,
+        files: &dyn DataFiles,
+    ) -> Result<(), ReadError> {
+        for i in self.files() {
+            let name = names.name(i);
+            stored.seek_samples(&mut *open_named(files, &name)?, &self.part(i, &name), shape.voxel)?;
+        }
+        Ok(())
+    }
 }
 
 fn voxels_per_file(names: &FileNames, n_promised: u128) -> Result<u128, ReadError> {

@@ -63,6 +63,11 @@ pub enum ReadError {
     TooFewCompressed { what: String, n_compressed_bytes: u64, expected_bytes: u128 },
     #[error("{} holds {}; {} promised", one_line(what), counted(*found, "sample", "samples"), are(*expected as u128))]
     TooFewSamples { what: String, found: usize, expected: usize },
+    /// A chunk that is not there, of a store all of whose chunks were written.
+    #[error("{what} is not stored; all chunks of this store were, so it is lost")]
+    LostChunk { what: String },
+    #[error("the checksum of {what} is wrong: it is damaged")]
+    WrongChecksum { what: String },
     #[error("cannot read {what}: {source}")]
     Io { what: String, source: io::Error },
     #[error("no memory for {} of voxels", bytes(*n_bytes))]

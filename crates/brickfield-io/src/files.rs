@@ -30,6 +30,14 @@ impl DataFiles for Folder {
     }
 }
 
+impl Folder {
+    /// As [`open`](DataFiles::open), for as long as one likes.
+    pub(crate) fn open_owned(&self, name: &str) -> Result<Box<dyn ByteSource>, ReadError> {
+        let file = open_regular(&self.0.join(name)).map_err(|e| ReadError::io(format!("data file {name:?}"), e))?;
+        Ok(Box::new(BufReader::with_capacity(1 << 16, file)))
+    }
+}
+
 /// Files in memory, by name.
 impl DataFiles for BTreeMap<String, Vec<u8>> {
     fn open(&self, name: &str) -> io::Result<Box<dyn ByteSource + '_>> {

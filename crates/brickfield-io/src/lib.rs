@@ -49,6 +49,7 @@ mod save;
 mod save_note;
 mod saved;
 mod series;
+mod slices;
 mod stored;
 mod stored_type;
 mod stored_voxel;
@@ -69,12 +70,13 @@ pub use limits::Limits;
 pub use note::Note;
 pub use numbers::ByteOrder;
 pub use open::{detect, open, open_raw};
-pub use opened::{Opened, WorldFrame};
+pub use opened::{Opened, VolumeFacts, WorldFrame};
 pub use options::OpenOptions;
 pub use raw::RawSpec;
 pub use save::{check_save_path, save};
 pub use save_note::{SaveNote, Saved};
 pub use saved::{Compression, SAVED_EXTENSIONS, SaveError, SaveOptions};
+pub use slices::{SliceSource, open_raw_slices, open_slices};
 
 /// The stored types that can be read, for messages.
 pub(crate) const STORED_TYPES: &str = "8 to 64 bit integers, 32 and 64 bit floats are";

@@ -5,7 +5,7 @@ use std::fmt;
 use brickfield_core::{NonFinite, ScalarType};
 
 use crate::ChoiceKind;
-use crate::error::{Shown, counted};
+use crate::error::{Shown, bytes, counted};
 
 /// Something about a file that the volume alone does not show.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,6 +54,8 @@ pub enum Note {
     MissingChunks { n_missing: u64, n_chunks: u64 },
     /// Planes of an OME-TIFF that are in none of its files; their voxels are 0.
     MissingPlanes { n_missing: u64, n_planes: u64 },
+    /// A volume of which slices were asked for, whose format is read whole.
+    ReadWhole { n_bytes: u64 },
     /// Pages of a TIFF that are reduced copies of others.
     PagesSkipped { n_pages: usize },
     /// The file was read as raw voxels, but begins as files of a known format do.
@@ -140,6 +142,9 @@ impl fmt::Display for Note {
             }
             Note::MissingPlanes { n_missing, n_planes } => {
                 write!(f, "{n_missing} of {n_planes} planes are not stored; their voxels are 0")
+            }
+            Note::ReadWhole { n_bytes } => {
+                write!(f, "the format cannot be read slice by slice: all {} of voxels are in memory", bytes(n_bytes))
             }
             Note::PagesSkipped { n_pages } => {
                 let pages = counted(n_pages, "page", "pages");

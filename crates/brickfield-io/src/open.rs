@@ -5,6 +5,8 @@ use std::io::{BufReader, Seek};
 use std::path::Path;
 
 use crate::error::Shown;
+#[cfg(feature = "nifti")]
+use crate::files::ByteSource;
 use crate::files::{open_regular, read_head};
 use crate::folder::visit_files;
 use crate::foreign::{ForeignFormat, after_user_block, foreign};
@@ -138,14 +140,19 @@ fn has_picture(folder: &Path) -> bool {
     false
 }
 
-fn buffered(path: &Path) -> Result<BufReader<File>, ReadError> {
+/// The folder of a file.
+pub(crate) fn parent(path: &Path) -> Folder {
+    Folder(path.parent().unwrap_or(Path::new("")).to_owned())
+}
+
+pub(crate) fn buffered(path: &Path) -> Result<BufReader<File>, ReadError> {
     let file = open_regular(path).map_err(|e| ReadError::io("the file", e))?;
     Ok(BufReader::with_capacity(1 << 16, file))
 }
 
 fn open_file(path: &Path, format: Format, options: &OpenOptions) -> Result<Opened, ReadError> {
     let mut file = buffered(path)?;
-    let folder = Folder(path.parent().unwrap_or(Path::new("")).to_owned());
+    let folder = parent(path);
     match format {
         Format::Nrrd => nrrd::read(file, &folder, options),
         Format::MetaImage => metaimage::read(file, &folder, options),
@@ -219,6 +226,20 @@ fn feature_off(format: Format) -> ReadError {
 #[cfg(any(feature = "dicom", feature = "nifti", feature = "tiff", feature = "png"))]
 fn file_name(path: &Path) -> String {
     path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// The file with the header of a NIfTI file or pair, and its name without the end.
+#[cfg(feature = "nifti")]
+pub(crate) fn nifti_header(path: &Path, folder: &Folder) -> Result<(Box<dyn ByteSource>, String), ReadError> {
+    let stem = stem(path);
+    let header: Box<dyn ByteSource> = match is_image_of_pair(path) {
+        true => {
+            let name = format!("{stem}.hdr");
+            folder.open_owned(&name).or_else(|e| folder.open_owned(&format!("{name}.gz")).map_err(|_| e))?
+        }
+        false => Box::new(buffered(path)?),
+    };
+    Ok((header, stem))
 }
 
 /// The file's name without `.hdr`, `.img`, `.hdr.gz` or `.img.gz`.

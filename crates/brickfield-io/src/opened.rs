@@ -1,7 +1,7 @@
 //! The result of a reader.
 
 use brickfield_core::glam::DVec3;
-use brickfield_core::{Grid, Rescale, ValueRange, Volume, Voxels};
+use brickfield_core::{Grid, Rescale, ScalarType, ValueRange, Volume, Voxels};
 
 use crate::choice::{Choices, Chosen, Entries};
 use crate::{Choice, ChoiceKind, Format, Note, OpenOptions, ReadError};
@@ -20,6 +20,27 @@ pub struct Opened {
     /// Notes that the user ought to know.
     pub notes: Vec<Note>,
     /// What the file has several of, and which was read.
+    pub choices: Vec<Choice>,
+}
+
+/// All about a volume but its samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VolumeFacts {
+    /// Where the voxels lie.
+    pub grid: Grid,
+    /// The type of the samples.
+    pub scalar: ScalarType,
+    /// The map from samples to data values.
+    pub rescale: Rescale,
+    /// The format that is read.
+    pub format: Format,
+    /// What the axes of the world mean.
+    pub frame: WorldFrame,
+    /// The unit of world lengths as the file names it, if it does: "mm", "micrometer".
+    pub unit: Option<String>,
+    /// Notes that the user ought to know.
+    pub notes: Vec<Note>,
+    /// What the file has several of, and which is read.
     pub choices: Vec<Choice>,
 }
 
@@ -97,6 +118,16 @@ impl FileFacts {
             self.notes.push(Note::OneOfSeveral { kind, read: choice.label(entry), n_entries: choice.n_entries });
         }
         Ok(entry)
+    }
+
+    /// The facts of a volume whose samples are read later, slice by slice or box by box.
+    pub(crate) fn described(self, grid: Grid, scalar: ScalarType, rescale: Rescale) -> Result<VolumeFacts, ReadError> {
+        let grid = match self.spacing {
+            Some(spacing) => respaced(&grid, spacing)?,
+            None => grid,
+        };
+        let FileFacts { format, frame, unit, notes, choices, .. } = self;
+        Ok(VolumeFacts { grid, scalar, rescale, format, frame, unit, notes, choices: choices.finish()? })
     }
 
     pub(crate) fn finish(self, grid: Grid, voxels: Voxels) -> Result<Opened, ReadError> {

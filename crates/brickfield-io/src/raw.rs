@@ -5,15 +5,17 @@ use std::io::{BufRead, Seek};
 use std::path::Path;
 
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{ScalarType, Volume};
+use brickfield_core::{Rescale, ScalarType, Volume};
 
+use crate::detached::Promised;
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
 use crate::placement::GridPlacement;
 use crate::save_note::Stated;
 use crate::saved::{SaveError, save_atomically, values, write_samples};
-use crate::stored::{ByteSkip, DataFile, Encoding, StoredSamples};
-use crate::{ByteOrder, Format, OpenOptions, Opened, ReadError, SaveNote, SaveOptions, Saved, WorldFrame};
+use crate::slices::{SamplesAt, StoredVolume};
+use crate::stored::{ByteSkip, Encoding, StoredSamples};
+use crate::{ByteOrder, Format, NoFiles, OpenOptions, Opened, ReadError, SaveNote, SaveOptions, Saved, WorldFrame};
 
 /// The numbers that a raw file does not state.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,15 +59,18 @@ impl fmt::Display for RawSpec {
 /// # Errors
 /// As [`ReadError`] lists them: a shape beyond the limits or the file, a spacing that is not above 0.
 pub fn read(mut input: impl BufRead + Seek, spec: &RawSpec, options: &OpenOptions) -> Result<Opened, ReadError> {
+    described(spec, options)?.read(&mut input, &NoFiles)
+}
+
+/// The volume of the caller's numbers.
+pub(crate) fn described(spec: &RawSpec, options: &OpenOptions) -> Result<StoredVolume, ReadError> {
     let shape = CheckedShape::claim(spec.dims.to_array().map(u64::from), spec.scalar, &options.limits)?;
     let grid = GridPlacement::axis_aligned(spec.spacing, 0.5 * spec.spacing).grid(shape.dims)?;
     let byte_skip = ByteSkip::Bytes(spec.skip_bytes);
     let stored = StoredSamples { encoding: Encoding::Raw, order: spec.order, line_skip: 0, byte_skip };
-    let n_voxels = shape.n_voxels();
-    let part = DataFile { name: "the file", n_voxels: n_voxels as u128, n_before: 0, n_wanted: n_voxels };
-    let mut found = FileFacts::plain(Format::Raw, options);
-    let voxels = stored.read(&mut input, &part, &shape, &mut found.notes)?;
-    found.finish(grid, voxels)
+    let promised = Promised { n_voxels: shape.n_voxels() as u128, n_before: 0 };
+    let (found, place) = (FileFacts::plain(Format::Raw, options), SamplesAt::Here("the file"));
+    Ok(StoredVolume { found, grid, rescale: Rescale::IDENTITY, shape, stored, promised, place })
 }
 
 /// Saves the values alone, x fastest: whole or not at all, for the file is renamed into place.

@@ -17,11 +17,18 @@ use crate::stored_voxel::{StoredVoxel, keep_components};
 /// # Errors
 /// If there is no memory for them.
 pub(crate) fn allocate(shape: &CheckedShape) -> Result<Voxels, ReadError> {
+    room_for(shape.scalar, shape.n_voxels())
+}
+
+/// No voxels, with room for `n`.
+///
+/// # Errors
+/// If there is no memory for them.
+pub(crate) fn room_for(scalar: ScalarType, n: usize) -> Result<Voxels, ReadError> {
     fn reserve<T: Scalar>(n: usize) -> Result<Voxels, ReadError> {
         with_room(n).map(T::wrap)
     }
-    let n = shape.n_voxels();
-    match shape.scalar {
+    match scalar {
         ScalarType::U8 => reserve::<u8>(n),
         ScalarType::I8 => reserve::<i8>(n),
         ScalarType::U16 => reserve::<u16>(n),

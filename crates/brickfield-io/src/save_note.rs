@@ -29,6 +29,8 @@ pub enum SaveNote {
     UnitLost { format: Format, unit: String },
     /// Nothing but samples was written; `spec` is what `brickfield --raw` must be told.
     SamplesAlone { spec: String },
+    /// OME-Zarr has no words for the direction of axes; it is stated in an attribute of our own.
+    DirectionOwn,
     /// NIfTI-2 was written, which many programs do not open.
     Nifti2 { reason: String },
 }
@@ -87,6 +89,10 @@ impl fmt::Display for SaveNote {
                     "the file has samples alone: --raw {spec} reads it; place, direction, frame and unit are lost"
                 )
             }
+            SaveNote::DirectionOwn => f.write_str(
+                "the axes of the volume are not those of the world; OME-Zarr has no words for that: brickfield reads the \
+                 direction from an attribute of its own, and other programs show the volume along its own axes",
+            ),
             SaveNote::Nifti2 { reason } => {
                 write!(f, "the file is NIfTI-2, which many programs do not open, for {reason}")
             }

@@ -4,7 +4,8 @@ use std::borrow::Cow;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use brickfield_core::{Rescale, Volume, Voxels, with_voxels};
+use brickfield_core::glam::UVec3;
+use brickfield_core::{Level, Rescale, ScalarType, Volume, Voxels, with_voxels};
 
 use crate::{ByteOrder, Format, WorldFrame};
 
@@ -53,6 +54,20 @@ pub enum SaveError {
     IsThere { path: PathBuf },
     #[error("{}: {format} {fault}", path.display())]
     Unsupported { path: PathBuf, format: Format, fault: String },
+    /// Slices that are none of a level; there is nothing at the path.
+    #[error("{}: {n_samples} samples of {found} after {n_slices} slices of level {}, which has {} slices of {} x {} samples of {expected}", path.display(), level.0, dims.z, dims.x, dims.y)]
+    Slices {
+        path: PathBuf,
+        level: Level,
+        dims: UVec3,
+        n_slices: u32,
+        n_samples: usize,
+        found: ScalarType,
+        expected: ScalarType,
+    },
+    /// Not all slices came; there is nothing at the path.
+    #[error("{}: {n_slices} of {n_expected} slices of {what} were handed over; nothing is saved", path.display())]
+    Incomplete { path: PathBuf, what: String, n_slices: u32, n_expected: u32 },
 }
 
 /// The ends of names that [`save`](crate::save()) knows, for messages and help texts.

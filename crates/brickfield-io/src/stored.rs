@@ -1,5 +1,7 @@
 //! How samples are stored in a data file, and reading one file of them.
 
+#[cfg(feature = "gzip")]
+use std::io::Read;
 use std::io::{self, BufRead, SeekFrom};
 
 use brickfield_core::Voxels;
@@ -52,7 +54,7 @@ pub(crate) struct DataFile<'a> {
 
 impl DataFile<'_> {
     /// The voxels up to the last one that is wanted.
-    fn n_to_end(&self) -> u128 {
+    pub(crate) fn n_to_end(&self) -> u128 {
         self.n_before.saturating_add(self.n_wanted as u128)
     }
 }
@@ -151,10 +153,10 @@ impl StoredSamples {
             #[cfg(feature = "gzip")]
             Encoding::Deflate => return self.append_inflated(voxels, source, part, shape, notes),
         }
-        if part.n_voxels == part.n_to_end() && has_surplus(source, self.encoding)? {
-            note_surplus(notes);
+        match part.n_voxels == part.n_to_end() {
+            true => note_rest(source, self.encoding, notes),
+            false => Ok(()),
         }
-        Ok(())
     }
 
     #[cfg(feature = "gzip")]
@@ -167,18 +169,7 @@ impl StoredSamples {
         notes: &mut Vec<Note>,
     ) -> Result<(), ReadError> {
         let voxel_bytes = shape.voxel.n_bytes() as u128;
-        let n_skip = match self.byte_skip {
-            ByteSkip::Bytes(n) => n,
-            ByteSkip::ToFitEnd => {
-                let n_bytes = measure_inflated(source, part.name, &shape.limits)?;
-                let expected_bytes = part.n_voxels.saturating_mul(voxel_bytes);
-                check_length(part.name, n_bytes, expected_bytes)?;
-                n_bytes - expected_bytes as u64
-            }
-        };
-        let mut inflated = crate::deflate::inflate(source).map_err(|e| ReadError::io(part.name, e))?;
-        skip(&mut inflated, n_skip, &format!("what is to be skipped of {}", part.name))?;
-        skip(&mut inflated, saturated(part.n_before * voxel_bytes), part.name)?;
+        let mut inflated = self.inflated(source, part, shape)?;
         append_binary(voxels, &mut inflated, part.n_wanted, shape.voxel, self.order, part.name)?;
         if part.n_voxels == part.n_to_end() {
             let n_bytes = saturated(part.n_to_end() * voxel_bytes);
@@ -189,7 +180,33 @@ impl StoredSamples {
 }
 
 #[cfg(feature = "gzip")]
-fn saturated(n: u128) -> u64 {
+impl StoredSamples {
+    /// The unpacked bytes of a source from the first voxel that is wanted on.
+    pub(crate) fn inflated<'a>(
+        &self,
+        mut source: impl ByteSource + 'a,
+        part: &DataFile,
+        shape: &CheckedShape,
+    ) -> Result<Box<dyn Read + 'a>, ReadError> {
+        let voxel_bytes = shape.voxel.n_bytes() as u128;
+        let n_skip = match self.byte_skip {
+            ByteSkip::Bytes(n) => n,
+            ByteSkip::ToFitEnd => {
+                let n_bytes = measure_inflated(&mut source, part.name, &shape.limits)?;
+                let expected_bytes = part.n_voxels.saturating_mul(voxel_bytes);
+                check_length(part.name, n_bytes, expected_bytes)?;
+                n_bytes - expected_bytes as u64
+            }
+        };
+        let mut inflated = crate::deflate::inflate(source).map_err(|e| ReadError::io(part.name, e))?;
+        skip(&mut inflated, n_skip, &format!("what is to be skipped of {}", part.name))?;
+        skip(&mut inflated, saturated(part.n_before * voxel_bytes), part.name)?;
+        Ok(inflated)
+    }
+}
+
+#[cfg(feature = "gzip")]
+pub(crate) fn saturated(n: u128) -> u64 {
     u64::try_from(n).unwrap_or(u64::MAX)
 }
 
@@ -197,7 +214,7 @@ fn saturated(n: u128) -> u64 {
 #[cfg(feature = "gzip")]
 fn measure_inflated(source: &mut dyn ByteSource, name: &str, limits: &Limits) -> Result<u64, ReadError> {
     let start = source.stream_position().map_err(|e| ReadError::io(name, e))?;
-    let mut inflated = crate::deflate::inflate(source).map_err(|e| ReadError::io(name, e))?;
+    let mut inflated = crate::deflate::inflate(&mut *source).map_err(|e| ReadError::io(name, e))?;
     let (mut n_bytes, mut piece) = (0u64, vec![0; 1 << 15]);
     loop {
         match inflated.read(&mut piece) {
@@ -210,6 +227,18 @@ fn measure_inflated(source: &mut dyn ByteSource, name: &str, limits: &Limits) ->
     drop(inflated);
     source.seek(SeekFrom::Start(start)).map_err(|e| ReadError::io(name, e))?;
     Ok(n_bytes)
+}
+
+/// Notes that data go on after the last voxel.
+pub(crate) fn note_rest(
+    source: &mut dyn ByteSource,
+    encoding: Encoding,
+    notes: &mut Vec<Note>,
+) -> Result<(), ReadError> {
+    if has_surplus(source, encoding)? {
+        note_surplus(notes);
+    }
+    Ok(())
 }
 
 fn has_surplus(source: &mut dyn ByteSource, encoding: Encoding) -> Result<bool, ReadError> {

@@ -58,6 +58,12 @@ impl StoredType {
         }
     }
 
+    /// The name of this type, if samples are read into another one.
+    #[cfg(feature = "ome-zarr")]
+    pub(crate) fn other_than(self, scalar: ScalarType) -> Option<&'static str> {
+        (self != StoredType::Scalar(scalar)).then(|| self.name())
+    }
+
     /// All voxels in the type that they are to have, with a note if the file's is another one: 64-bit integers become
     /// the narrowest integers that hold them, else f64.
     ///

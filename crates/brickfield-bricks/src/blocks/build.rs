@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
-use brickfield_core::{BlockLayout, BlockSide, BlockSummary, Rescale, ScalarType, Volume, with_voxels};
+use brickfield_core::glam::UVec3;
+use brickfield_core::{BlockLayout, BlockSide, BlockSummary, Rescale, ScalarType, Volume, Voxels, with_voxels};
 use rayon::prelude::*;
 
 use super::shrink::{BlockScalar, BlockVoxels, Totals};
 use super::source::SourceId;
 use super::summary::{Summing, constant_summary};
 use super::volume::{BlockVolume, n_averages, n_before};
+use crate::SliceError;
 use crate::build::try_zeroed;
 
 /// How to cut a volume into blocks.
@@ -106,14 +108,57 @@ fn fill_block<T: BlockScalar>(
         out.fill(least);
         return constant_summary(rescale.value(least.to_f64()));
     }
+    let mut rest = out;
+    summarized(block, layout, rescale, (least, greatest), |totals| {
+        rest = totals.write_means(least, greatest, std::mem::take(&mut rest));
+    })
+}
+
+/// The summary of a block with several values; shows the sums of each of its levels.
+fn summarized<T: BlockScalar>(
+    block: BlockVoxels<'_, T>,
+    layout: &BlockLayout,
+    rescale: Rescale,
+    (least, greatest): (T, T),
+    mut show: impl FnMut(&Totals<T>),
+) -> BlockSummary {
     let mut summing = Summing::new(block, least, greatest, rescale);
-    let (mut totals, mut rest) = (Totals::of_voxels(block), out);
+    let mut totals = Totals::of_voxels(block);
     loop {
-        rest = totals.write_means(least, greatest, rest);
+        show(&totals);
         summing.add_level(&totals);
         if totals.level() == layout.side().one_sample() {
             return summing.with_mean(totals.mean());
         }
         totals = totals.next();
     }
+}
+
+/// The summaries of the blocks of some slices, by [`BlockLayout::ordinal`] in a layout of those slices.
+///
+/// If the first slice begins a layer of blocks of the volume, they are the blocks of the volume, and the summaries are those that
+/// [`build_blocks`] makes, bit by bit. `voxels` are the stored numbers of `dims`, x fastest.
+///
+/// # Errors
+/// If the voxels do not fill the slices.
+pub fn block_summaries(
+    voxels: &Voxels,
+    dims: UVec3,
+    side: BlockSide,
+    rescale: Rescale,
+) -> Result<Vec<BlockSummary>, SliceError> {
+    let (layout, n_samples) = (BlockLayout::new(dims, side), voxels.len());
+    if n_samples != dims.to_array().into_iter().map(|n| n as usize).product() {
+        return Err(SliceError::Ragged { n_samples, dims });
+    }
+    fn of<T: BlockScalar>(block: BlockVoxels<'_, T>, layout: &BlockLayout, rescale: Rescale) -> BlockSummary {
+        match block.ends() {
+            (least, greatest) if least == greatest => constant_summary(rescale.value(least.to_f64())),
+            ends => summarized(block, layout, rescale, ends, |_| {}),
+        }
+    }
+    let blocks = (0..layout.n_blocks_total()).into_par_iter().map(|i| layout.block(i));
+    Ok(with_voxels!(voxels, v => {
+        blocks.map(|block| of(BlockVoxels::new(v, &layout, block), &layout, rescale)).collect()
+    }))
 }

@@ -7,7 +7,7 @@ mod source;
 mod summary;
 mod volume;
 
-pub use build::{BlockBuildError, BlockOptions, build_blocks};
+pub use build::{BlockBuildError, BlockOptions, block_summaries, build_blocks};
 pub use memory::{BlockMemory, BlockTally, block_memory};
 pub use source::{BlockSource, FetchError, NoSuchBlock, SourceId, fetch_values};
 pub use volume::BlockVolume;

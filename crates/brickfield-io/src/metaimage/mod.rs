@@ -11,12 +11,12 @@ pub use write::{save, write};
 use std::collections::BTreeMap;
 use std::io::{BufRead, Seek};
 
-use brickfield_core::ScalarType;
 use brickfield_core::glam::DVec3;
+use brickfield_core::{Rescale, ScalarType};
 
 use crate::choice::Entries;
 use crate::colour::Colours;
-use crate::detached::{Promised, read_detached};
+use crate::detached::Promised;
 use crate::error::{Shown, counted};
 use crate::file_list::FileNames;
 use crate::files::ByteSource;
@@ -26,6 +26,7 @@ use crate::lines::{HeaderLines, numbers};
 use crate::opened::FileFacts;
 use crate::placement::{AXES, GridPlacement, usable_spacing};
 use crate::series::{OuterAxis, choose_volume};
+use crate::slices::{SamplesAt, StoredVolume};
 use crate::stored::{ByteSkip, Encoding, StoredSamples};
 use crate::stored_type::StoredType;
 use crate::stored_voxel::{MAX_COMPONENTS, StoredVoxel};
@@ -43,6 +44,11 @@ pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, options: &Ope
 }
 
 fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
+    described(source, options)?.read(source, files)
+}
+
+/// The volume of the header; the source is then at the first byte of local data.
+pub(crate) fn described(source: &mut dyn ByteSource, options: &OpenOptions) -> Result<StoredVolume, ReadError> {
     let header = MetaHeader::read(source)?;
     let stored = header.stored()?;
     let mut found = FileFacts::plain(Format::MetaImage, options);
@@ -52,12 +58,9 @@ fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenO
     let grid = header.placement(&mut found.notes)?.grid(shape.dims)?;
     let n_before = n_before * shape.n_voxels() as u128;
     let promised = Promised { n_voxels: n_samples("DimSize", &header.sizes)?, n_before };
-    let voxels = match &header.data {
-        Some(names) => read_detached(names, promised, &shape, &stored, files, &mut found.notes)?,
-        None => stored.read(source, &promised.attached(&shape), &shape, &mut found.notes)?,
-    };
     (found.frame, found.unit) = (header.frame(), header.unit());
-    found.finish(grid, voxels)
+    let place = header.data.map_or(SamplesAt::Here("the data after the header"), SamplesAt::Files);
+    Ok(StoredVolume { found, grid, rescale: Rescale::IDENTITY, shape, stored, promised, place })
 }
 
 struct MetaHeader {

@@ -4,7 +4,7 @@ use crate::error::{Shown, check_length};
 use crate::files::ByteSource;
 use crate::limits::n_samples;
 use crate::stored::Encoding;
-use crate::wrapped::{HeaderNumbers, read_header, read_start};
+use crate::wrapped::{HeaderNumbers, encoding_of, read_header, read_start};
 use crate::{ByteOrder, Format, ReadError};
 
 /// The fields of either version that a volume needs.
@@ -42,8 +42,9 @@ enum Version {
 }
 
 impl NiftiHeader {
-    /// The header at the start of the source, which stays where it is.
-    pub(super) fn read(source: &mut dyn ByteSource, encoding: Encoding) -> Result<NiftiHeader, ReadError> {
+    /// The header at the start of the source, gzipped or not; the source stays where it is.
+    pub(super) fn read(source: &mut dyn ByteSource) -> Result<NiftiHeader, ReadError> {
+        let encoding = encoding_of(source)?;
         let (version, order) = version_of(source, encoding)?;
         match version {
             Version::One => {

@@ -15,17 +15,19 @@ use brickfield_core::{Rescale, ScalarType};
 
 use crate::choice::Entries;
 use crate::colour::Colours;
+use crate::detached::Promised;
 use crate::files::ByteSource;
 use crate::limits::{CheckedShape, check_bytes};
 use crate::opened::FileFacts;
 use crate::placement::{AXES, GridPlacement, usable_spacing};
 use crate::rescale::StatedRescale;
 use crate::series::{OuterAxis, choose_volume};
-use crate::stored::{ByteSkip, DataFile, StoredSamples};
+use crate::slices::{SamplesAt, StoredVolume};
+use crate::stored::{ByteSkip, StoredSamples};
 use crate::stored_type::StoredType;
 use crate::stored_voxel::StoredVoxel;
 use crate::wrapped::{encoding_of, open_part};
-use crate::{ChoiceKind, DataFiles, Format, Note, OpenOptions, Opened, ReadError, WorldFrame};
+use crate::{ChoiceKind, DataFiles, Folder, Format, Note, OpenOptions, Opened, ReadError, WorldFrame};
 use header::{NiftiHeader, UNITS};
 
 /// Reads a NIfTI file from its header on. The image of a pair is `files`' `{stem}.img` or `{stem}.img.gz`.
@@ -41,15 +43,36 @@ pub fn read(
     files: &dyn DataFiles,
     options: &OpenOptions,
 ) -> Result<Opened, ReadError> {
-    let encoding = encoding_of(&mut input)?;
-    let header = NiftiHeader::read(&mut input, encoding)?;
+    let header = NiftiHeader::read(&mut input)?;
     match header.is_of_pair {
-        false => read_image(&header, &mut input, options),
-        true => read_image(&header, &mut *open_part(&format!("{stem}.img"), files)?, options),
+        false => described(&header, &mut input, options)?.read(&mut input, files),
+        true => {
+            let mut image = open_part(&format!("{stem}.img"), files)?;
+            described(&header, &mut *image, options)?.read(&mut *image, files)
+        }
     }
 }
 
-fn read_image(header: &NiftiHeader, source: &mut dyn ByteSource, options: &OpenOptions) -> Result<Opened, ReadError> {
+/// The volume of a header in a file, and the file that its samples are in, not read from yet.
+pub(crate) fn described_on_disk(
+    mut input: Box<dyn ByteSource>,
+    stem: &str,
+    folder: &Folder,
+    options: &OpenOptions,
+) -> Result<(StoredVolume, Box<dyn ByteSource>), ReadError> {
+    let header = NiftiHeader::read(&mut *input)?;
+    if header.is_of_pair {
+        let name = format!("{stem}.img");
+        input = folder.open_owned(&name).or_else(|e| folder.open_owned(&format!("{name}.gz")).map_err(|_| e))?;
+    }
+    Ok((described(&header, &mut *input, options)?, input))
+}
+
+fn described(
+    header: &NiftiHeader,
+    source: &mut dyn ByteSource,
+    options: &OpenOptions,
+) -> Result<StoredVolume, ReadError> {
     let mut found = FileFacts::plain(Format::Nifti, options);
     let [x, y, z, outer @ ..] = header.sizes;
     let voxel = voxel(header, &mut found)?;
@@ -62,12 +85,9 @@ fn read_image(header: &NiftiHeader, source: &mut dyn ByteSource, options: &OpenO
     check_bytes(u128::from(offset), &options.limits, || "the space before vox_offset".to_owned())?;
     let (encoding, byte_skip) = (encoding_of(source)?, ByteSkip::Bytes(offset));
     let stored = StoredSamples { encoding, order: header.order, line_skip: 0, byte_skip };
-    let n_wanted = shape.n_voxels();
-    let n_before = n_before * n_wanted as u128;
-    let part = DataFile { name: "the image", n_voxels: header.n_samples, n_before, n_wanted };
-    let voxels = stored.read(source, &part, &shape, &mut found.notes)?;
+    let promised = Promised { n_voxels: header.n_samples, n_before: n_before * shape.n_voxels() as u128 };
     (found.frame, found.unit) = (frame, unit(header));
-    found.finish_rescaled(grid, voxels, rescale)
+    Ok(StoredVolume { found, grid, rescale, shape, stored, promised, place: SamplesAt::Here("the image") })
 }
 
 /// nifti1.h: the fourth axis is time, the fifth has the components of a vector.

@@ -13,10 +13,13 @@ pub use write::{save, write};
 
 use std::io::{BufRead, Seek};
 
-use crate::detached::{Promised, read_detached};
+use brickfield_core::Rescale;
+
+use crate::detached::Promised;
 use crate::files::ByteSource;
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
+use crate::slices::{SamplesAt, StoredVolume};
 use crate::{DataFiles, Format, OpenOptions, Opened, ReadError};
 use axes::Part;
 use header::NrrdHeader;
@@ -35,6 +38,11 @@ pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, options: &Ope
 }
 
 fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
+    described(source, options)?.read(source, files)
+}
+
+/// The volume of the header; the source is then at the first byte of attached data.
+pub(crate) fn described(source: &mut dyn ByteSource, options: &OpenOptions) -> Result<StoredVolume, ReadError> {
     let header = NrrdHeader::read(source)?;
     let stored_type = header.stored_type()?;
     let stored = header.stored(stored_type)?;
@@ -44,10 +52,7 @@ fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenO
     let shape = CheckedShape::claim(space.dims, voxel, &options.limits)?;
     let grid = space.placement.grid(shape.dims)?;
     let promised = Promised { n_voxels: header.n_samples / u128::from(voxel.n_components), n_before };
-    let voxels = match header.file_names()? {
-        Some(names) => read_detached(&names, promised, &shape, &stored, files, &mut found.notes)?,
-        None => stored.read(source, &promised.attached(&shape), &shape, &mut found.notes)?,
-    };
+    let place = header.file_names()?.map_or(SamplesAt::Here("the data after the header"), SamplesAt::Files);
     (found.frame, found.unit) = (space.frame, space.unit);
-    found.finish(grid, voxels)
+    Ok(StoredVolume { found, grid, rescale: Rescale::IDENTITY, shape, stored, promised, place })
 }

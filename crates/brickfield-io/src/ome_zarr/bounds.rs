@@ -41,10 +41,10 @@ pub(super) enum Packing {
 /// A shard: chunks in a chunk, found by an index of offset and length at one end.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Shard {
-    part_shape: Vec<u64>,
-    codecs: Codecs,
-    is_index_first: bool,
-    index_has_checksum: bool,
+    pub(super) part_shape: Vec<u64>,
+    pub(super) codecs: Codecs,
+    pub(super) is_index_first: bool,
+    pub(super) index_has_checksum: bool,
 }
 
 impl Compressor {
@@ -169,7 +169,11 @@ impl Shard {
     }
 }
 
-fn check_stream(codecs: Codecs, stored: &[u8], max_bytes: u64, what: &str) -> Result<(), ReadError> {
+/// Checks that stored bytes unpack to no more than `max_bytes`.
+pub(super) fn check_stream(codecs: Codecs, stored: &[u8], max_bytes: u64, what: &str) -> Result<(), ReadError> {
+    if codecs.n_outer_checksums > 0 && !ends_with_checksum(stored) {
+        return Err(ReadError::WrongChecksum { what: what.to_owned() });
+    }
     let n_packed = (stored.len() as u64).saturating_sub(CHECKSUM_BYTES * codecs.n_outer_checksums);
     let stored = &stored[..n_packed as usize];
     let max_bytes = max_bytes.saturating_add(CHECKSUM_BYTES * codecs.n_inner_checksums);
@@ -192,6 +196,12 @@ fn check_stream(codecs: Codecs, stored: &[u8], max_bytes: u64, what: &str) -> Re
         });
     }
     Ok(())
+}
+
+/// Whether the last bytes are the CRC-32C of those before.
+fn ends_with_checksum(stored: &[u8]) -> bool {
+    let parts = stored.split_last_chunk::<{ CHECKSUM_BYTES as usize }>();
+    parts.is_some_and(|(bytes, checksum)| crc32c::crc32c(bytes).to_le_bytes() == *checksum)
 }
 
 /// Bytes that come out, counted up to one more than allowed and not kept; on a fault, the bytes that came before.

@@ -21,6 +21,8 @@ pub(super) struct Part<'a> {
     pub(super) volume_axes: VolumeAxes,
     /// The entry along each axis that is none of the volume's.
     pub(super) entries: &'a [u64],
+    /// Whether all chunks are stored, so that one that is not is lost.
+    pub(super) is_packed: bool,
 }
 
 /// Reads all chunks that hold the part; notes that some are not stored.
@@ -112,7 +114,9 @@ impl Reader<'_> {
         }
         let what = format!("chunk {indices:?}");
         let stored = self.array.retrieve_encoded_chunk(&indices).map_err(|e| ReadError::decoder(&what, e))?;
-        let Some(stored) = stored else { return Ok(false) };
+        let Some(stored) = stored else {
+            return if self.part.is_packed { Err(ReadError::LostChunk { what }) } else { Ok(false) };
+        };
         let named = format!("{what} of {} stored", bytes(stored.len()));
         let sample_bytes = self.metadata.stored.n_bytes() as u64;
         self.metadata.packing.check(&stored, chunk_shape, sample_bytes, &what)?;
@@ -154,7 +158,7 @@ impl Reader<'_> {
 }
 
 /// Samples from one entry to the next along each axis, the last being fastest.
-fn strides(shape: &[u64]) -> Vec<u64> {
+pub(super) fn strides(shape: &[u64]) -> Vec<u64> {
     let mut strides = vec![1; shape.len()];
     for axis in (1..shape.len()).rev() {
         strides[axis - 1] = strides[axis] * shape[axis];

@@ -11,19 +11,42 @@ use crate::choice::Entries;
 use crate::opened::FileFacts;
 use crate::{ChoiceKind, ReadError};
 
+/// An image at one level, and its array.
+pub(super) type ImageArray = (ZarrImage, ArrayMetadata);
+
 /// The image and its array at the level that is wanted.
 pub(super) fn find(
     store: &ReadableStorage,
     list: &dyn ListableStorageTraits,
     found: &mut FileFacts,
-) -> Result<(ZarrImage, ArrayMetadata), ReadError> {
+) -> Result<ImageArray, ReadError> {
+    let levels = find_levels(store, list, Depth::OneLevel, found)?;
+    levels.into_iter().next().ok_or(ReadError::Missing { field: "multiscales/datasets/path" })
+}
+
+/// Which levels of an image are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Depth {
+    /// The one that is wanted, else the finest.
+    OneLevel,
+    /// That one and all coarser ones.
+    AllCoarser,
+}
+
+/// The image and its arrays at some levels, the finest first; at least one.
+pub(super) fn find_levels(
+    store: &ReadableStorage,
+    list: &dyn ListableStorageTraits,
+    depth: Depth,
+    found: &mut FileFacts,
+) -> Result<Vec<ImageArray>, ReadError> {
     let root = Node::read(store, "")?.ok_or(ReadError::Missing { field: "zarr.json, .zgroup, .zarray or .zattrs" })?;
     if root.is_array {
-        return plain_array(store, String::new());
+        return Ok(vec![plain_array(store, String::new())?]);
     }
     if !root.multiscales().is_empty() {
         let chosen = choose_image(found, names_of(root.multiscales()))?;
-        return multiscale(store, "", &root, chosen, found);
+        return multiscale(store, "", &root, chosen, depth, found);
     }
     if let Some(plate) = root.ome().get("plate") {
         return Err(plate_refused(plate));
@@ -33,13 +56,13 @@ pub(super) fn find(
         let names = images.iter().map(|image| image.name.clone()).collect();
         let image = &images[choose_image(found, names)?];
         let node = group_of(store, &image.path)?;
-        return multiscale(store, &image.path, &node, 0, found);
+        return multiscale(store, &image.path, &node, 0, depth, found);
     }
     let arrays = arrays_within(store, list)?;
     if arrays.is_empty() {
         return Err(ReadError::Missing { field: "multiscales (in zarr.json or .zattrs), or an array," });
     }
-    choose_array(store, arrays, found)
+    Ok(vec![choose_array(store, arrays, found)?])
 }
 
 /// A group that is an image, and its name.
@@ -117,27 +140,43 @@ fn choose_image(found: &mut FileFacts, names: Vec<String>) -> Result<usize, Read
     Ok(found.choose(ChoiceKind::Image, Entries::Named(names))? as usize)
 }
 
-/// An image of a group at the level that is wanted, else the finest.
+/// An image of a group from the level that is wanted on, else from the finest.
 fn multiscale(
     store: &ReadableStorage,
     group: &str,
     node: &Node,
     chosen: usize,
+    depth: Depth,
     found: &mut FileFacts,
-) -> Result<(ZarrImage, ArrayMetadata), ReadError> {
+) -> Result<Vec<ImageArray>, ReadError> {
     let multiscale = &node.multiscales()[chosen];
     let datasets = multiscale["datasets"].as_array().map_or(&[][..], Vec::as_slice);
-    let level = found.choices.choose(ChoiceKind::Level, Entries::Numbered(datasets.len() as u64), 0)?.entry;
-    let dataset = datasets.get(level as usize).unwrap_or(&Value::Null);
+    let level = found.choices.choose(ChoiceKind::Level, Entries::Numbered(datasets.len() as u64), 0)?.entry as usize;
+    let n_levels = match depth {
+        Depth::OneLevel => 1,
+        Depth::AllCoarser => datasets.len().saturating_sub(level).max(1),
+    };
+    found.frame = node.frame().unwrap_or(found.frame);
+    (level..level + n_levels).map(|level| level_of(store, group, node, multiscale, level)).collect()
+}
+
+fn level_of(
+    store: &ReadableStorage,
+    group: &str,
+    node: &Node,
+    multiscale: &Value,
+    level: usize,
+) -> Result<ImageArray, ReadError> {
+    let dataset = &multiscale["datasets"][level];
     let path = dataset["path"].as_str().ok_or(ReadError::Missing { field: "multiscales/datasets/path" })?;
     let path = joined(group, checked_path(path, "datasets/path")?);
     let array = ArrayMetadata::read(store, &path)?;
     let image = ZarrImage::of_multiscale(path, multiscale, dataset, node.ome())?;
-    found.frame = node.frame().unwrap_or(found.frame);
-    Ok((image, array))
+    let finest = ZarrImage::of_multiscale(String::new(), multiscale, &multiscale["datasets"][0], node.ome())?;
+    Ok((image.packed(node.is_packed()).turned(node.steps(), &finest), array))
 }
 
-fn plain_array(store: &ReadableStorage, path: String) -> Result<(ZarrImage, ArrayMetadata), ReadError> {
+fn plain_array(store: &ReadableStorage, path: String) -> Result<ImageArray, ReadError> {
     let array = ArrayMetadata::read(store, &path)?;
     let names = match &array.dimension_names {
         Value::Null => Node::read(store, &path)?.map_or(Value::Null, |node| node.array_dimensions().clone()),
@@ -147,11 +186,7 @@ fn plain_array(store: &ReadableStorage, path: String) -> Result<(ZarrImage, Arra
 }
 
 /// The array that is wanted, else the first of those with most axes: the others are positions along them.
-fn choose_array(
-    store: &ReadableStorage,
-    paths: Vec<String>,
-    found: &mut FileFacts,
-) -> Result<(ZarrImage, ArrayMetadata), ReadError> {
+fn choose_array(store: &ReadableStorage, paths: Vec<String>, found: &mut FileFacts) -> Result<ImageArray, ReadError> {
     let mut n_axes = Vec::new();
     for path in &paths {
         n_axes.push(ArrayMetadata::n_axes(store, path)?);

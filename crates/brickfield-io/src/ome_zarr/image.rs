@@ -1,6 +1,6 @@
 //! An image of a store: its array, its axes, and where it lies.
 
-use brickfield_core::glam::DVec3;
+use brickfield_core::glam::{DMat3, DVec3};
 use serde_json::Value;
 
 use super::axes::{Axis, VolumeAxes, choose_entries, volume_axes_by_name, volume_axes_of_array};
@@ -15,11 +15,22 @@ pub(super) struct ZarrImage {
     pub(super) path: String,
     /// Whether it is an image of OME-Zarr; a plain array has no place and no spacing.
     is_placed: bool,
+    /// Whether all chunks are stored, for this crate packed them.
+    pub(super) is_packed: bool,
+    /// The direction of axes that are not those of the world.
+    turn: Option<Turn>,
     axes: Vec<Axis>,
     /// World units per index, and the world position of index 0, for each axis.
     scale: Vec<f64>,
     translation: Vec<f64>,
     channel_names: Vec<String>,
+}
+
+/// The world steps of the finest level, and what its transformations say of them.
+struct Turn {
+    steps: DMat3,
+    scale: Vec<f64>,
+    translation: Vec<f64>,
 }
 
 /// Axes before version 0.3, which names none.
@@ -58,7 +69,23 @@ impl ZarrImage {
             return Err(ReadError::field("number of axes", axes.len(), format!("1 to {MAX_AXES}")));
         }
         let (scale, translation) = (vec![1.0; axes.len()], vec![0.0; axes.len()]);
-        Ok(ZarrImage { path, is_placed: false, axes, scale, translation, channel_names: Vec::new() })
+        let channel_names = Vec::new();
+        Ok(ZarrImage { path, is_placed: false, is_packed: false, turn: None, axes, scale, translation, channel_names })
+    }
+
+    pub(super) fn packed(self, is_packed: bool) -> ZarrImage {
+        ZarrImage { is_packed, ..self }
+    }
+
+    /// The image with axes of these steps at the finest level, whose transformations are those of `finest`.
+    pub(super) fn turned(self, steps: Option<DMat3>, finest: &ZarrImage) -> ZarrImage {
+        let (scale, translation) = (finest.scale.clone(), finest.translation.clone());
+        ZarrImage { turn: steps.map(|steps| Turn { steps, scale, translation }), ..self }
+    }
+
+    /// World units per index along x, y, z, before any direction; 1 where the array has no such axis.
+    pub(super) fn scale(&self, volume_axes: VolumeAxes) -> DVec3 {
+        along(volume_axes, &self.scale, 1.0)
     }
 
     /// Which axis is x, y, z, and the entry to read along each of the others.
@@ -89,11 +116,20 @@ impl ZarrImage {
             found.notes.extend(assumed.map(|(axis, _)| Note::SpacingAssumed { axis, reason }));
             return GridPlacement::axis_aligned(DVec3::ONE, DVec3::splat(0.5));
         }
-        let of = |values: &[f64], missing| DVec3::from(volume_axes.map(|axis| axis.map_or(missing, |a| values[a])));
         let units = volume_axes.map(|axis| axis.and_then(|a| self.axes[a].unit.as_deref()));
         let common = common_unit(units, &mut found.notes);
         found.unit = common.name;
-        GridPlacement::axis_aligned(of(&self.scale, 1.0), of(&self.translation, 0.0)).scaled(common.factors)
+        self.placement_in_own_units(volume_axes).scaled(common.factors)
+    }
+
+    fn placement_in_own_units(&self, volume_axes: VolumeAxes) -> GridPlacement {
+        let scale = self.scale(volume_axes);
+        let translation = along(volume_axes, &self.translation, 0.0);
+        let Some(turn) = &self.turn else { return GridPlacement::axis_aligned(scale, translation) };
+        let finest = along(volume_axes, &turn.scale, 1.0);
+        let first = along(volume_axes, &turn.translation, 0.0);
+        let first_sample = first + turn.steps * ((translation - first) / finest);
+        GridPlacement { first_sample, steps: turn.steps * DMat3::from_diagonal(scale / finest) }
     }
 
     /// Applies a list of transformations after the earlier ones.
@@ -133,4 +169,8 @@ impl ZarrImage {
             )
         })
     }
+}
+
+fn along(volume_axes: VolumeAxes, values: &[f64], missing: f64) -> DVec3 {
+    DVec3::from(volume_axes.map(|axis| axis.map_or(missing, |a| values[a])))
 }

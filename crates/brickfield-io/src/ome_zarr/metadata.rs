@@ -108,6 +108,17 @@ impl ArrayMetadata {
         Ok(ArrayMetadata { shape, chunk_shape, stored, packing, dimension_names, document: json.clone() })
     }
 
+    /// The metadata of an array whose chunks are the smallest parts that can be read alone: chunks, or parts of shards.
+    pub(super) fn of_parts(&self) -> Result<zarrs::array::ArrayMetadata, ReadError> {
+        let mut document = self.document.clone();
+        if let Packing::Shard(shard) = &self.packing {
+            let configuration = self.document["codecs"][0]["configuration"].clone();
+            document["chunk_grid"]["configuration"]["chunk_shape"] = shard.part_shape.clone().into();
+            document["codecs"] = configuration["codecs"].clone();
+        }
+        serde_json::from_value(document).map_err(|e| ReadError::decoder("the array metadata", e))
+    }
+
     /// The metadata as `zarrs` has them.
     pub(super) fn for_zarrs(&self) -> Result<zarrs::array::ArrayMetadata, ReadError> {
         serde_json::from_value(self.document.clone()).map_err(|e| ReadError::decoder("the array metadata", e))

@@ -9,10 +9,15 @@ mod chunks;
 mod find;
 mod image;
 mod json;
+mod levels;
 mod metadata;
 mod node;
+mod pack;
 mod write;
 
+pub use levels::ZarrLevels;
+pub(crate) use levels::slices;
+pub use pack::PyramidWriter;
 pub use write::save;
 
 use std::collections::BTreeMap;
@@ -75,7 +80,7 @@ fn read_from(
     let shape = CheckedShape::claim(dims, array.stored, &options.limits)?;
     let grid = image.placement(volume_axes, options.spacing.is_some(), &mut found).grid(shape.dims)?;
     array.check_chunks(&options.limits)?;
-    let part = Part { path: &image.path, volume_axes, entries: &entries };
+    let part = Part { path: &image.path, volume_axes, entries: &entries, is_packed: image.is_packed };
     let (voxels, note) = chunks::read(store, part, &array, &shape)?;
     found.notes.extend(note);
     let voxels = shape.converted(voxels, &mut found.notes)?;

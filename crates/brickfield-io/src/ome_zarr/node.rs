@@ -1,9 +1,11 @@
 //! The nodes of a store: groups and arrays, with their attributes.
 
+use brickfield_core::glam::DMat3;
 use serde_json::Value;
 use zarrs::storage::{ListableStorageTraits, ReadableStorage, StorePrefix};
 
 use super::json::read_json;
+use super::pack::{STEPS_KEY, is_packed};
 use crate::files::stays_within;
 use crate::{ReadError, WorldFrame};
 
@@ -39,6 +41,17 @@ impl Node {
     /// The frame, under a key of our own.
     pub(super) fn frame(&self) -> Option<WorldFrame> {
         WorldFrame::of_name(self.attributes[WorldFrame::KEY].as_str()?)
+    }
+
+    /// Whether this crate packed the group: then all of its shards are there.
+    pub(super) fn is_packed(&self) -> bool {
+        is_packed(&self.attributes)
+    }
+
+    /// The world steps along x, y and z of the finest level, under a key of our own.
+    pub(super) fn steps(&self) -> Option<DMat3> {
+        let columns: [[f64; 3]; 3] = serde_json::from_value(self.attributes[STEPS_KEY].clone()).ok()?;
+        Some(DMat3::from_cols_array_2d(&columns))
     }
 
     /// The names of an array's axes that Zarr v2 writers agreed upon.

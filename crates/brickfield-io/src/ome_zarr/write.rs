@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::{fs, io};
 
-use brickfield_core::glam::DVec3;
-use brickfield_core::{Grid, ScalarType, Volume, Voxels};
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{Grid, Level, ScalarType, Volume, Voxels};
 use serde_json::{Value, json};
 use zarrs::array::{Array, ArraySubset, CodecOptions};
 use zarrs::filesystem::FilesystemStore;
@@ -57,7 +57,7 @@ fn write(
     options: &SaveOptions,
 ) -> Result<ScalarType, Box<dyn std::error::Error + Send + Sync>> {
     fs::create_dir(folder)?;
-    fs::write(folder.join("zarr.json"), serde_json::to_vec_pretty(&group(volume.grid(), options))?)?;
+    fs::write(folder.join("zarr.json"), serde_json::to_vec_pretty(&group(volume.grid(), options, Level(0)))?)?;
     let voxels = values(volume);
     let store: ReadableWritableListableStorage = Arc::new(FilesystemStore::new(folder)?);
     let metadata = serde_json::from_value(array(volume.grid(), voxels.scalar_type(), options.compression))?;
@@ -79,24 +79,17 @@ fn write(
     Ok(voxels.scalar_type())
 }
 
-/// The metadata of the image.
-fn group(grid: &Grid, options: &SaveOptions) -> Value {
-    let first_sample = grid.index_to_world().transform_point3(DVec3::splat(0.5));
-    let slowest_first = |v: DVec3| [v.z, v.y, v.x];
+/// The metadata of an image of levels 0 to `coarsest`, each of half as many samples along each axis as the one below, rounded up.
+///
+/// The samples of level l are means of 2^l voxels along each axis: the first one lies (2^l - 1) / 2 voxels after that of level 0.
+pub(super) fn group(grid: &Grid, options: &SaveOptions, coarsest: Level) -> Value {
     let axis = |name: &str| match unit(options) {
         Some(unit) => json!({ "name": name, "type": "space", "unit": unit }),
         None => json!({ "name": name, "type": "space" }),
     };
-    let (scale, translation) = (slowest_first(grid.spacing()), slowest_first(first_sample));
-    let transformations = json!([
-        { "type": "scale", "scale": scale },
-        { "type": "translation", "translation": translation }
-    ]);
     let axes = ["z", "y", "x"].map(axis);
-    let image = json!({
-        "axes": axes,
-        "datasets": [{ "path": "0", "coordinateTransformations": transformations }]
-    });
+    let datasets: Vec<_> = (0..=coarsest.0).map(|l| dataset(grid, Level(l))).collect();
+    let image = json!({ "axes": axes, "datasets": datasets });
     let mut attributes = json!({ "ome": { "version": "0.5", "multiscales": [image] } });
     // OME-Zarr 0.5 has no words for a frame; without any, readers have one of pictures.
     if options.frame != WorldFrame::Pictures {
@@ -107,6 +100,20 @@ fn group(grid: &Grid, options: &SaveOptions) -> Value {
         "node_type": "group",
         "attributes": attributes
     })
+}
+
+fn dataset(grid: &Grid, level: Level) -> Value {
+    let first_sample = grid.index_to_world().transform_point3(DVec3::splat(0.5));
+    // Along a short axis there is one sample, of all voxels.
+    let n_voxels = grid.dims().min(UVec3::splat(level.stride())).as_dvec3();
+    let slowest_first = |v: DVec3| [v.z, v.y, v.x];
+    let scale = slowest_first(grid.spacing() * n_voxels);
+    let translation = slowest_first(first_sample + grid.spacing() * (0.5 * (n_voxels - 1.0)));
+    let transformations = json!([
+        { "type": "scale", "scale": scale },
+        { "type": "translation", "translation": translation }
+    ]);
+    json!({ "path": level.0.to_string(), "coordinateTransformations": transformations })
 }
 
 /// The names of units of length (OME-Zarr 0.5, "axes" metadata).
@@ -167,7 +174,7 @@ fn array(grid: &Grid, scalar: ScalarType, compression: Compression) -> Value {
     })
 }
 
-fn data_type(scalar: ScalarType) -> &'static str {
+pub(super) fn data_type(scalar: ScalarType) -> &'static str {
     match scalar {
         ScalarType::U8 => "uint8",
         ScalarType::I8 => "int8",

@@ -24,11 +24,14 @@ mod nrrd;
 mod nrrd_axes;
 #[cfg(feature = "ome-zarr")]
 mod ome_zarr;
+#[cfg(feature = "ome-zarr")]
+mod pack;
 #[cfg(any(feature = "tiff", feature = "png"))]
 mod pictures;
 mod raw;
 mod save;
 mod seeds;
+mod slices;
 mod stored;
 #[cfg(feature = "tiff")]
 mod tiff;

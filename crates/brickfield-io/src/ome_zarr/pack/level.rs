@@ -1,0 +1,157 @@
+//! Writing one level: slices are held until a layer of chunks is full.
+
+use brickfield_core::glam::UVec3;
+use brickfield_core::{Level, Scalar, ScalarType, Voxels, with_voxels};
+use serde_json::{Value, json};
+use zarrs::array::{Array, CodecOptions, Element};
+use zarrs::storage::{WritableStorage, WritableStorageTraits};
+
+use super::super::write::data_type;
+use super::Fault;
+use super::layer::{append, empty};
+use crate::Compression;
+
+/// Samples along a chunk's side; shards are one chunk deep.
+pub(super) const CHUNK_SIDE: u32 = 32;
+/// Samples of a shard along x and y.
+const SHARD_SIDE: u32 = 512;
+
+pub(super) struct LevelWriter {
+    array: Array<dyn WritableStorageTraits>,
+    dims: UVec3,
+    shard: UVec3,
+    /// Slices of a layer that is not full yet.
+    held: Voxels,
+    /// Slices of the layers that are written.
+    n_written: u32,
+}
+
+impl LevelWriter {
+    /// Level `level` of a volume of `dims` voxels.
+    pub(super) fn new(
+        store: &WritableStorage,
+        dims: UVec3,
+        level: Level,
+        scalar: ScalarType,
+        compression: Compression,
+    ) -> Result<LevelWriter, Fault> {
+        let dims = ((dims - 1) >> u32::from(level.0)) + 1;
+        let whole_chunks = |n: u32| n.div_ceil(CHUNK_SIDE) * CHUNK_SIDE;
+        let shard = UVec3::new(whole_chunks(dims.x), whole_chunks(dims.y), CHUNK_SIDE);
+        let shard = shard.min(UVec3::new(SHARD_SIDE, SHARD_SIDE, CHUNK_SIDE));
+        let metadata = serde_json::from_value(metadata(dims, shard, scalar, compression))?;
+        let array = Array::new_with_metadata(store.clone(), &format!("/{}", level.0), metadata)?;
+        Ok(LevelWriter { array, dims, shard, held: empty(scalar), n_written: 0 })
+    }
+
+    pub(super) fn dims(&self) -> UVec3 {
+        self.dims
+    }
+
+    pub(super) fn scalar_type(&self) -> ScalarType {
+        self.held.scalar_type()
+    }
+
+    /// Slices that have come.
+    pub(super) fn n_slices(&self) -> u32 {
+        self.n_written + (self.held.len() / self.n_slice()) as u32
+    }
+
+    fn n_slice(&self) -> usize {
+        self.dims.x as usize * self.dims.y as usize
+    }
+
+    /// Whether these are slices of the level that are still missing.
+    pub(super) fn takes(&self, slices: &Voxels) -> bool {
+        let n = self.n_slice();
+        let fits = slices.len() / n <= (self.dims.z - self.n_slices()) as usize;
+        slices.scalar_type() == self.scalar_type() && slices.len().is_multiple_of(n) && fits
+    }
+
+    /// Takes slices, and writes each layer that is full with them; the last one, too.
+    pub(super) fn push(&mut self, slices: Voxels) -> Result<(), Fault> {
+        let (n_slice, mut from) = (self.n_slice(), 0);
+        while from < slices.len() {
+            let n_layer = CHUNK_SIDE.min(self.dims.z - self.n_written) as usize * n_slice;
+            if from == 0 && self.held.is_empty() && slices.len() == n_layer {
+                self.write_layer(&slices)?;
+                return Ok(());
+            }
+            let n = (n_layer - self.held.len()).min(slices.len() - from);
+            append(&mut self.held, &slices, from..from + n);
+            from += n;
+            if self.held.len() == n_layer {
+                let layer = std::mem::replace(&mut self.held, empty(slices.scalar_type()));
+                self.write_layer(&layer)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn write_layer(&mut self, layer: &Voxels) -> Result<(), Fault> {
+        let n_shards = (self.dims - 1) / self.shard + 1;
+        for y in 0..n_shards.y {
+            for x in 0..n_shards.x {
+                with_voxels!(layer, v => self.write_shard(v, x, y)?);
+            }
+        }
+        self.n_written += (layer.len() / self.n_slice()) as u32;
+        Ok(())
+    }
+
+    /// Writes a shard of the layer, filled up with zeros.
+    fn write_shard<T: Scalar + Element>(&self, layer: &[T], x: u32, y: u32) -> Result<(), Fault> {
+        let first = [x * self.shard.x, y * self.shard.y].map(|i| i as usize);
+        let [nx, ny] = [self.dims.x, self.dims.y].map(|n| n as usize);
+        let [shard_x, shard_y, shard_z] = self.shard.to_array().map(|n| n as usize);
+        let n_row = shard_x.min(nx - first[0]);
+        let mut samples = vec![T::default(); shard_x * shard_y * shard_z];
+        for (z, slice) in layer.chunks_exact(nx * ny).enumerate() {
+            for (row, y) in (first[1]..ny.min(first[1] + shard_y)).enumerate() {
+                let to = shard_x * (row + shard_y * z);
+                let from = nx * y + first[0];
+                samples[to..to + n_row].copy_from_slice(&slice[from..from + n_row]);
+            }
+        }
+        // A shard of zeros as well: one that is missing might be a loss.
+        let whole = CodecOptions::default().with_store_empty_chunks(true);
+        let z = self.n_written / CHUNK_SIDE;
+        Ok(self.array.store_chunk_opt(&[z, y, x].map(u64::from), samples, &whole)?)
+    }
+
+    pub(super) fn write_metadata(&self) -> Result<(), Fault> {
+        Ok(self.array.store_metadata()?)
+    }
+}
+
+fn metadata(dims: UVec3, shard: UVec3, scalar: ScalarType, compression: Compression) -> Value {
+    let slowest_first = |v: UVec3| [v.z, v.y, v.x];
+    let little = json!({ "name": "bytes", "configuration": { "endian": "little" } });
+    let checksum = json!({ "name": "crc32c" });
+    let mut codecs = vec![little.clone()];
+    if compression == Compression::Lossless {
+        codecs.push(json!({ "name": "zstd", "configuration": { "level": 3, "checksum": false } }));
+    }
+    codecs.push(checksum.clone());
+    let chunk = [CHUNK_SIDE; 3];
+    let sharding = json!({
+        "name": "sharding_indexed",
+        "configuration": {
+            "chunk_shape": chunk,
+            "codecs": codecs,
+            "index_codecs": [little, checksum],
+            "index_location": "end"
+        }
+    });
+    json!({
+        "zarr_format": 3,
+        "node_type": "array",
+        "shape": slowest_first(dims),
+        "data_type": data_type(scalar),
+        "chunk_grid": { "name": "regular", "configuration": { "chunk_shape": slowest_first(shard) } },
+        "chunk_key_encoding": { "name": "default", "configuration": { "separator": "/" } },
+        "fill_value": 0,
+        "codecs": [sharding],
+        "dimension_names": ["z", "y", "x"]
+    })
+}
