@@ -5,6 +5,7 @@ mod blocks;
 mod build;
 mod downsample;
 mod fill;
+mod mean;
 mod memory;
 mod pyramid;
 mod sample;

@@ -73,6 +73,7 @@ fn level_memory(layout: &BrickLayout, level: Level, scalar: ScalarType) -> Level
     }
 }
 
-fn product(n: U64Vec3) -> u64 {
+/// The product, or the greatest number where that is less.
+pub(crate) fn product(n: U64Vec3) -> u64 {
     n.to_array().into_iter().fold(1, u64::saturating_mul)
 }

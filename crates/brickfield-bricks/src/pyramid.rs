@@ -3,8 +3,10 @@
 use std::ops::AddAssign;
 
 use brickfield_core::glam::UVec3;
-use brickfield_core::{Level, Scalar, ScalarType, Voxels, with_voxels};
+use brickfield_core::{Level, N_BLOCK_LEVELS, Scalar, ScalarType, Voxels, with_voxels};
 use rayon::prelude::*;
+
+use crate::mean::{add_pairs, nearest};
 
 /// The coarsest level of a [`Pyramid`]: 64 bits hold the sum of 2^30 voxels of 32 bits.
 pub const MAX_PYRAMID_LEVEL: Level = Level(10);
@@ -12,11 +14,11 @@ pub const MAX_PYRAMID_LEVEL: Level = Level(10);
 /// Samples along each side that the coarsest level of a pyramid has at most, if [`MAX_PYRAMID_LEVEL`] allows.
 const COARSEST_SIDE: u32 = 32;
 /// Blocks have levels up to this one.
-const BLOCK_LEVELS: u8 = 5;
+const BLOCK_LEVELS: u8 = N_BLOCK_LEVELS as u8 - 1;
 
 /// Samples of a level along x, y, z: ceil(dims / 2^level).
 pub fn level_dims(dims: UVec3, level: Level) -> UVec3 {
-    ((dims.max(UVec3::ONE) - 1) >> u32::from(level.0)) + 1
+    level.dims_of(dims)
 }
 
 /// The coarsest level that is worth storing: every level of blocks is there, and the coarsest is at most 32 samples a side (up to
@@ -127,15 +129,6 @@ trait PyramidScalar: Scalar {
     fn of(voxels: &Voxels) -> &[Self];
 }
 
-/// floor(sum / n + 1/2).
-#[inline]
-fn nearest(sum: i64, n: i64) -> i64 {
-    match n & (n - 1) {
-        0 => (sum + n / 2) >> n.trailing_zeros(),
-        _ => sum.div_euclid(n) + i64::from(2 * sum.rem_euclid(n) >= n),
-    }
-}
-
 /// Keeps sums of 2^30 values of f64 finite; a power of two changes no digit.
 const F64_SCALE: f64 = 1.0 / (1u64 << 30) as f64;
 
@@ -199,7 +192,7 @@ impl<T: PyramidScalar> Plane<T> {
         let n = level_dims(self.dims, self.level).x as usize;
         let pair_rows = below.par_chunks(2 * nx).with_min_len(MIN_ROWS);
         self.sums.par_chunks_mut(n).with_min_len(MIN_ROWS).zip(pair_rows).for_each(|(sums, rows)| {
-            rows.chunks(nx).for_each(|row| add_pairs::<S, T::Sum>(row, &widen, sums));
+            rows.chunks(nx).for_each(|row| add_pairs(row, &widen, sums));
         });
         self.n_added += 1;
     }
@@ -248,20 +241,6 @@ impl<T: PyramidScalar> Planes for Vec<Plane<T>> {
             }
             plane.begin_next();
         }
-    }
-}
-
-/// Adds a row to one of half as many sums, in the order in which blocks add theirs.
-#[inline]
-fn add_pairs<S: Copy, A: Copy + AddAssign>(row: &[S], widen: &impl Fn(S) -> A, sums: &mut [A]) {
-    let (pairs, odd) = row.as_chunks::<2>();
-    for (sum, [a, b]) in sums.iter_mut().zip(pairs) {
-        let mut pair = widen(*a);
-        pair += widen(*b);
-        *sum += pair;
-    }
-    if let ([last], Some(sum)) = (odd, sums.last_mut()) {
-        *sum += widen(*last);
     }
 }
 
@@ -346,9 +325,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn integer_halves_go_up() {
-        assert_eq!([nearest(3, 2), nearest(-3, 2), nearest(-1, 2), nearest(7, 1)], [2, -1, 0, 7]);
-        assert_eq!([nearest(9, 6), nearest(-9, 6), nearest(-10, 6), nearest(10, 3)], [2, -1, -2, 3]);
+    fn means_of_the_most_voxels_are_held() {
         let n = 1 << 30;
         assert_eq!(u32::mean(n * i64::from(u32::MAX), n as u64), u32::MAX);
         assert_eq!(u32::mean((n - 1) * i64::from(u32::MAX), n as u64 - 1), u32::MAX);

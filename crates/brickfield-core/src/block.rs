@@ -146,7 +146,13 @@ impl BlockLayout {
     /// Samples of a block along x, y, z: ceil(extent / 2^level).
     #[inline]
     pub fn n_samples(&self, block: UVec3, level: Level) -> UVec3 {
-        ((self.extent(block) - 1) >> u32::from(level.0)) + 1
+        level.dims_of(self.extent(block))
+    }
+
+    /// Number of samples of a block.
+    #[inline]
+    pub fn n_samples_total(&self, block: UVec3, level: Level) -> u64 {
+        self.n_samples(block, level).as_u64vec3().element_product()
     }
 
     /// Where the samples of a block lie, in sample space: the first one, and the last one.
@@ -195,6 +201,8 @@ impl Interblock {
     }
 }
 
+/// Levels that a block may have: those of the largest side.
+pub const N_BLOCK_LEVELS: usize = BlockSide::V32.one_sample().0 as usize + 1;
 /// Bins of a [`BlockSummary`].
 pub const N_BLOCK_BINS: usize = 16;
 
@@ -209,7 +217,7 @@ pub struct BlockSummary {
     pub counts: [u16; N_BLOCK_BINS],
     /// For each level, the variance that averages of its samples keep, as a part of the voxels' variance: 1 at level 0, 0 at
     /// one sample.
-    pub kept_variance: [f32; 6],
+    pub kept_variance: [f32; N_BLOCK_LEVELS],
     /// The variance of its voxels.
     pub variance: f64,
 }

@@ -16,6 +16,12 @@ impl Level {
     pub const fn stride(self) -> u32 {
         1 << self.0
     }
+
+    /// Samples of this level that stand for `dims` of level 0 along x, y, z: ceil(dims / 2^level). A zero dimension counts as one.
+    #[inline]
+    pub fn dims_of(self, dims: UVec3) -> UVec3 {
+        ((dims.max(UVec3::ONE) - 1) >> u32::from(self.0)) + 1
+    }
 }
 
 /// One brick of an octree: its level and its place among the bricks of that level.

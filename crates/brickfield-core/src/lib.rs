@@ -14,7 +14,7 @@ mod space;
 mod transfer;
 mod volume;
 
-pub use block::{BlockLayout, BlockSide, BlockSideError, BlockSummary, Interblock, N_BLOCK_BINS};
+pub use block::{BlockLayout, BlockSide, BlockSideError, BlockSummary, Interblock, N_BLOCK_BINS, N_BLOCK_LEVELS};
 pub use brick::{BrickId, Cut, CutError, Level};
 pub use camera::{Camera, CameraError, PixelRays, Projection};
 pub use glam;

@@ -16,6 +16,11 @@ pub struct Limits {
     pub max_bytes: u64,
 }
 
+impl Limits {
+    /// No limit but that of memory.
+    pub(crate) const UNBOUNDED: Limits = Limits { max_bytes: i64::MAX as u64 };
+}
+
 impl Default for Limits {
     /// 16 GiB: 2048 x 2048 x 2048 voxels of 16 bits.
     fn default() -> Limits {
@@ -57,7 +62,7 @@ impl CheckedShape {
         let what = |part: &str| format!("{part} of {} x {} x {} voxels of {stored}", dims[0], dims[1], dims[2]);
         let n_bytes = scalar.n_bytes().max(stored.n_bytes()) as u128;
         check_bytes(shape.n_voxels_claimed() * n_bytes, limits, || what("a volume"))?;
-        let all = Limits { max_bytes: i64::MAX as u64 };
+        let all = Limits::UNBOUNDED;
         check_bytes(shape.n_voxels_claimed() * voxel.n_bytes() as u128, &all, || what("the components"))?;
         Ok(shape)
     }

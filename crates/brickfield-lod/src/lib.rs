@@ -10,7 +10,7 @@ mod tile;
 
 pub use blocks::{
     BlockBudget, BlockErrors, BlockLevels, BlockLevelsError, BlockSelection, BlockView, BudgetError, BudgetSize,
-    EstimateError, Importance, LevelErrors, N_LEVELS, OneSampleBlocks, Reconstruction, Slab, SlabError, block_weights,
+    EstimateError, Importance, LevelErrors, OneSampleBlocks, Reconstruction, Slab, SlabError, block_weights,
     changed_values, exact_errors, rank_correlation, select_block_levels,
 };
 pub use criterion::{Criterion, CriterionInView};

@@ -6,7 +6,7 @@ use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, BlockLayout, BlockSide, Level, ScalarType};
 use brickfield_lod::{
     BlockBudget, BlockLevels, BlockSelection, BlockView, BudgetError, BudgetSize, Culling, Importance, LevelErrors,
-    N_LEVELS, OneSampleBlocks, block_weights, select_block_levels,
+    OneSampleBlocks, block_weights, select_block_levels,
 };
 use proptest::prelude::*;
 use scene::scene;
@@ -187,7 +187,7 @@ fn a_ratio_is_of_the_volumes_bytes() {
 #[test]
 fn numbers_that_mean_nothing_buy_nothing() {
     let mut errors = vec![FALLING; 64];
-    errors[1] = [f32::NAN; N_LEVELS];
+    errors[1] = [f32::NAN; brickfield_core::N_BLOCK_LEVELS];
     errors[2] = [0.0, 0.0, 0.0, 0.0, f32::INFINITY, 0.0];
     let mut weights = vec![1.0; 64];
     weights[3..7].copy_from_slice(&[0.0, -1.0, f32::NAN, f32::INFINITY]);

@@ -3,6 +3,8 @@
 use brickfield_core::glam::U64Vec3;
 use brickfield_core::{BlockLayout, Level, ScalarType};
 
+use crate::memory::product;
+
 /// Samples and bytes of blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BlockTally {
@@ -57,8 +59,4 @@ impl BlockMemory {
     pub fn ratio_of_all(&self) -> f64 {
         self.volume_bytes as f64 / (self.larger.bytes + self.one_sample.bytes) as f64
     }
-}
-
-fn product(n: U64Vec3) -> u64 {
-    n.to_array().into_iter().fold(1, u64::saturating_mul)
 }

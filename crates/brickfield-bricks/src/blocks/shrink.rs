@@ -5,6 +5,7 @@ use std::ops::{Add, AddAssign};
 use brickfield_core::glam::UVec3;
 use brickfield_core::{BlockLayout, Level};
 
+use crate::mean::{add_pairs, nearest};
 use crate::sample::BrickScalar;
 
 /// The most voxels in a block, 32^3.
@@ -21,15 +22,6 @@ pub(crate) trait BlockScalar: BrickScalar {
     fn rounded_mean(total: Self::Total, n: u32) -> Self;
 }
 
-/// floor(total / n + 1/2).
-#[inline]
-fn nearest(total: i64, n: u32) -> i64 {
-    match n.is_power_of_two() {
-        true => (total + i64::from(n / 2)) >> n.trailing_zeros(),
-        false => (2 * total + i64::from(n)).div_euclid(2 * i64::from(n)),
-    }
-}
-
 macro_rules! integers {
     ($($t:ident $total:ident;)*) => { $(
         impl BlockScalar for $t {
@@ -39,7 +31,7 @@ macro_rules! integers {
             #[inline]
             fn mean(total: $total, n: u32) -> f64 { total as f64 / f64::from(n) }
             #[inline]
-            fn rounded_mean(total: $total, n: u32) -> $t { nearest(total as i64, n) as $t }
+            fn rounded_mean(total: $total, n: u32) -> $t { nearest(total as i64, i64::from(n)) as $t }
         }
     )* };
 }
@@ -142,7 +134,7 @@ impl<T: BlockScalar> Totals<T> {
         let extent = block.extent();
         let n = halved(extent);
         let mut totals = vec![T::Total::default(); n.element_product() as usize];
-        add_pairs(block.rows(), extent, T::total, &mut totals);
+        add_rows(block.rows(), extent, T::total, &mut totals);
         Totals { level: Level(1), extent, totals }
     }
 
@@ -150,7 +142,7 @@ impl<T: BlockScalar> Totals<T> {
     pub(crate) fn next(&self) -> Totals<T> {
         let n = self.n_samples();
         let mut totals = vec![T::Total::default(); halved(n).element_product() as usize];
-        add_pairs(self.totals.chunks_exact(n.x as usize), n, |total| total, &mut totals);
+        add_rows(self.totals.chunks_exact(n.x as usize), n, |total| total, &mut totals);
         Totals { level: Level(self.level.0 + 1), extent: self.extent, totals }
     }
 
@@ -159,7 +151,7 @@ impl<T: BlockScalar> Totals<T> {
     }
 
     fn n_samples(&self) -> UVec3 {
-        ((self.extent - 1) >> u32::from(self.level.0)) + 1
+        self.level.dims_of(self.extent)
     }
 
     /// Each sum, x fastest, with the number of voxels in it.
@@ -213,7 +205,7 @@ fn halved(n: UVec3) -> UVec3 {
 
 /// Adds rows (y fastest, `n` samples in all) to half as many along each axis.
 #[inline]
-fn add_pairs<'a, S: Copy + 'a, A: Copy + Add<Output = A> + AddAssign>(
+fn add_rows<'a, S: Copy + 'a, A: Copy + AddAssign>(
     rows: impl Iterator<Item = &'a [S]>,
     n: UVec3,
     widen: impl Fn(S) -> A,
@@ -223,14 +215,7 @@ fn add_pairs<'a, S: Copy + 'a, A: Copy + Add<Output = A> + AddAssign>(
     for (row, samples) in rows.enumerate() {
         let [y, z] = [row as u32 % n.y / 2, row as u32 / n.y / 2];
         let start = (half.x * (y + half.y * z)) as usize;
-        let sums = &mut totals[start..start + half.x as usize];
-        let (pairs, odd) = samples.as_chunks::<2>();
-        for (sum, [a, b]) in sums.iter_mut().zip(pairs) {
-            *sum += widen(*a) + widen(*b);
-        }
-        if let ([last], Some(sum)) = (odd, sums.last_mut()) {
-            *sum += widen(*last);
-        }
+        add_pairs(samples, &widen, &mut totals[start..start + half.x as usize]);
     }
 }
 
@@ -239,9 +224,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn integer_halves_go_up() {
-        assert_eq!([nearest(3, 2), nearest(-3, 2), nearest(-1, 2), nearest(7, 1)], [2, -1, 0, 7]);
-        assert_eq!([nearest(9, 6), nearest(-9, 6), nearest(-10, 6), nearest(10, 3)], [2, -1, -2, 3]);
+    fn means_of_the_most_voxels_are_held() {
         assert_eq!(u16::rounded_mean(32_768 * 65_535, 32_768), 65_535);
         assert_eq!(u32::rounded_mean(32_767 * 4_294_967_295, 32_767), u32::MAX);
     }

@@ -49,7 +49,7 @@ impl BlockVolume {
     }
 
     fn copy_averages(&self, block: UVec3, level: Level, n: usize, out: &mut [u8]) {
-        let below: usize = (1..level.0).map(|l| n_samples(&self.layout, block, Level(l))).sum();
+        let below: usize = (1..level.0).map(|l| self.layout.n_samples_total(block, Level(l)) as usize).sum();
         let start = n_before(&self.layout, block) + below;
         with_voxels!(&self.averages, v => BrickScalar::copy_le_bytes(&v[start..start + n], out));
     }
@@ -86,7 +86,7 @@ impl BlockSource for BlockVolume {
 
     fn fetch(&self, block: UVec3, level: Level, out: &mut Vec<u8>) -> Result<(), FetchError> {
         FetchError::unless_exists(&self.layout, block, level)?;
-        let n = n_samples(&self.layout, block, level);
+        let n = self.layout.n_samples_total(block, level) as usize;
         out.clear();
         out.resize(n * self.scalar_type().n_bytes(), 0);
         match level {
@@ -97,13 +97,9 @@ impl BlockSource for BlockVolume {
     }
 }
 
-pub(crate) fn n_samples(layout: &BlockLayout, block: UVec3, level: Level) -> usize {
-    layout.n_samples(block, level).to_array().into_iter().map(|n| n as usize).product()
-}
-
 /// Averages of a block, of all levels above 0.
 pub(crate) fn n_averages(layout: &BlockLayout, block: UVec3) -> usize {
-    (1..=layout.side().one_sample().0).map(|l| n_samples(layout, block, Level(l))).sum()
+    (1..=layout.side().one_sample().0).map(|l| layout.n_samples_total(block, Level(l)) as usize).sum()
 }
 
 /// Averages of all blocks before one, by ordinal.

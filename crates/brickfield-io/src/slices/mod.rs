@@ -38,7 +38,7 @@ pub trait SliceSource {
 /// One line that names the path, what is wrong, the value and the bound.
 pub fn open_slices(path: &Path, options: &OpenOptions) -> Result<Box<dyn SliceSource>, OpenError> {
     let format = detect(path)?;
-    let unbounded = OpenOptions { limits: Limits { max_bytes: i64::MAX as u64 }, ..options.clone() };
+    let unbounded = OpenOptions { limits: Limits::UNBOUNDED, ..options.clone() };
     match in_order(path, format, &unbounded).map_err(|fault| OpenError::new(path, fault))? {
         Some(slices) => Ok(slices),
         None => Ok(Box::new(WholeSlices::new(open(path, options)?, &options.limits))),
@@ -50,7 +50,7 @@ pub fn open_slices(path: &Path, options: &OpenOptions) -> Result<Box<dyn SliceSo
 /// # Errors
 /// One line that names the path, what is wrong, the value and the bound.
 pub fn open_raw_slices(path: &Path, spec: &RawSpec, options: &OpenOptions) -> Result<Box<dyn SliceSource>, OpenError> {
-    let unbounded = OpenOptions { limits: Limits { max_bytes: i64::MAX as u64 }, ..options.clone() };
+    let unbounded = OpenOptions { limits: Limits::UNBOUNDED, ..options.clone() };
     let opened = || {
         let volume = raw::described(spec, &unbounded)?;
         volume.slices(Box::new(buffered(path)?), parent(path))

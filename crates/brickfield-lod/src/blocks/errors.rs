@@ -1,6 +1,6 @@
 //! The visible errors of all blocks, kept from edit to edit.
 
-use brickfield_core::{BlockLayout, BlockSummary, TransferFunction, ValueRange};
+use brickfield_core::{BlockLayout, BlockSummary, N_BLOCK_LEVELS, TransferFunction, ValueRange};
 use rayon::prelude::*;
 
 use super::change::changed_values;
@@ -8,11 +8,8 @@ use super::estimate::estimate;
 use super::slab::Slab;
 use super::table::ColorTable;
 
-/// Levels that a block may have: those of the largest side.
-pub const N_LEVELS: usize = 6;
-
 /// The error of a block at each level, finest first: root mean square of Delta E over its voxels. Level 0 has none.
-pub type LevelErrors = [f32; N_LEVELS];
+pub type LevelErrors = [f32; N_BLOCK_LEVELS];
 
 /// The visible error of every block at every level, estimated from summaries and a transfer function (Ljung, Lundstroem,
 /// Ynnerman and Museth 2004; 2006, section 4).
@@ -63,7 +60,7 @@ impl BlockErrors {
         check(layout, summaries)?;
         let nothing = ValueRange { min: f64::INFINITY, max: f64::NEG_INFINITY };
         let range = summaries.iter().fold(nothing, |all, summary| all.union(summary.range));
-        let errors = vec![[0.0; N_LEVELS]; summaries.len()];
+        let errors = vec![[0.0; N_BLOCK_LEVELS]; summaries.len()];
         let mut all = BlockErrors { layout: *layout, slab, range, transfer: transfer.clone(), errors };
         all.estimate_in(summaries, ValueRange { min: f64::NEG_INFINITY, max: f64::INFINITY });
         Ok(all)
@@ -108,7 +105,7 @@ impl BlockErrors {
         let concerned = concerned.filter(|(_, summary)| summary.range.min <= max && min <= summary.range.max);
         let estimated = concerned.map(|(errors, summary)| {
             *errors = match transfer.is_transparent(summary.range) {
-                true => [0.0; N_LEVELS],
+                true => [0.0; N_BLOCK_LEVELS],
                 false => estimate(summary, side, &table),
             };
         });

@@ -1,9 +1,9 @@
 //! The visible error of one block's levels, from its summary.
 
 use brickfield_core::glam::Vec4;
-use brickfield_core::{BlockSide, BlockSummary, N_BLOCK_BINS};
+use brickfield_core::{BlockSide, BlockSummary, N_BLOCK_BINS, N_BLOCK_LEVELS};
 
-use super::errors::{LevelErrors, N_LEVELS};
+use super::errors::LevelErrors;
 use super::table::ColorTable;
 
 /// Values that stand for a bin.
@@ -13,7 +13,7 @@ const N_POINTS: usize = N_PER_BIN * N_BLOCK_BINS;
 
 /// The root mean square of Delta E between voxels and what each level shows in their place; see [`BlockErrors`](super::BlockErrors).
 pub(crate) fn estimate(summary: &BlockSummary, side: BlockSide, table: &ColorTable) -> LevelErrors {
-    let mut errors = [0.0; N_LEVELS];
+    let mut errors = [0.0; N_BLOCK_LEVELS];
     let width = summary.range.max - summary.range.min;
     if width > 0.0 && summary.variance > 0.0 {
         let moments = Moments::new(summary, table);

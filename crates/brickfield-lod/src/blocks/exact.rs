@@ -1,11 +1,11 @@
 //! The visible error of blocks from all of their samples: slow, to judge estimates by.
 
 use brickfield_core::glam::UVec3;
-use brickfield_core::{BlockLayout, Level, TransferFunction};
+use brickfield_core::{BlockLayout, Level, N_BLOCK_LEVELS, TransferFunction};
 use rayon::prelude::*;
 
 use super::Slab;
-use super::errors::{LevelErrors, N_LEVELS};
+use super::errors::LevelErrors;
 
 /// How voxels are shown by a level's samples, within a block.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -36,7 +36,7 @@ pub fn exact_errors<E: Send>(
     values: impl Fn(UVec3, Level) -> Result<Vec<f64>, E> + Sync,
 ) -> Result<Vec<LevelErrors>, E> {
     let of_block = |ordinal| {
-        let (block, mut errors) = (layout.block(ordinal), [0.0; N_LEVELS]);
+        let (block, mut errors) = (layout.block(ordinal), [0.0; N_BLOCK_LEVELS]);
         let luv = |value: f64| slab.luv(transfer.at(value));
         let voxels: Vec<[f64; 3]> = values(block, Level(0))?.into_iter().map(luv).collect();
         for level in layout.side().levels().skip(1) {

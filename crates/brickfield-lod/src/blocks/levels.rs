@@ -1,9 +1,7 @@
 //! A level for every block.
 
 use brickfield_core::glam::UVec3;
-use brickfield_core::{BlockLayout, Level, ScalarType};
-
-use super::errors::N_LEVELS;
+use brickfield_core::{BlockLayout, Level, N_BLOCK_LEVELS, ScalarType};
 
 /// The level of every block of a volume.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -98,8 +96,8 @@ impl BlockLevels {
     }
 
     /// Number of blocks of each level, finest first; 0 for levels that the blocks do not have.
-    pub fn n_blocks_per_level(&self) -> [usize; N_LEVELS] {
-        let mut n = [0; N_LEVELS];
+    pub fn n_blocks_per_level(&self) -> [usize; N_BLOCK_LEVELS] {
+        let mut n = [0; N_BLOCK_LEVELS];
         self.levels.iter().for_each(|level| n[usize::from(level.0)] += 1);
         n
     }
@@ -107,14 +105,8 @@ impl BlockLevels {
     /// Bytes of the samples of all blocks, one-sample blocks included.
     pub fn n_bytes(&self, scalar: ScalarType) -> u64 {
         let blocks = self.layout.blocks().zip(&self.levels);
-        blocks.map(|(block, level)| n_samples(&self.layout, block, *level) * scalar.n_bytes() as u64).sum()
+        blocks.map(|(block, level)| self.layout.n_samples_total(block, *level) * scalar.n_bytes() as u64).sum()
     }
-}
-
-/// Samples of a block at a level.
-#[inline]
-pub(crate) fn n_samples(layout: &BlockLayout, block: UVec3, level: Level) -> u64 {
-    layout.n_samples(block, level).as_u64vec3().element_product()
 }
 
 /// The finaliser of SplitMix64 (Steele, Lea and Flood 2014): every bit of the input turns half of the output's.

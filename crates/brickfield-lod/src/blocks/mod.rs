@@ -12,7 +12,7 @@ mod table;
 mod weights;
 
 pub use change::changed_values;
-pub use errors::{BlockErrors, EstimateError, LevelErrors, N_LEVELS};
+pub use errors::{BlockErrors, EstimateError, LevelErrors};
 pub use exact::{Reconstruction, exact_errors};
 pub use levels::{BlockLevels, BlockLevelsError};
 pub use rank::rank_correlation;

@@ -1,10 +1,10 @@
 //! A byte budget, spent where it removes the most visible error.
 
-use brickfield_core::{BlockLayout, Level, ScalarType};
+use brickfield_core::{BlockLayout, Level, N_BLOCK_LEVELS, ScalarType};
 use rayon::prelude::*;
 
-use super::errors::{LevelErrors, N_LEVELS};
-use super::levels::{BlockLevels, n_samples};
+use super::errors::LevelErrors;
+use super::levels::BlockLevels;
 
 /// The bytes that the samples of all blocks may take.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,7 +122,7 @@ pub fn select_block_levels(
 /// Steps are numbered in 32 bits, and a block has at most five.
 const MAX_BLOCKS: usize = (u32::MAX / N_STEPS as u32) as usize;
 
-const N_STEPS: usize = N_LEVELS - 1;
+const N_STEPS: usize = N_BLOCK_LEVELS - 1;
 
 fn check_lengths(layout: &BlockLayout, errors: &[LevelErrors], weights: Option<&[f32]>) -> Result<(), BudgetError> {
     let (n_blocks, n_errors) = (layout.n_blocks_total(), errors.len());
@@ -179,7 +179,7 @@ struct Tariff<'a> {
     layout: &'a BlockLayout,
     ordinal: usize,
     /// Cost of each level.
-    costs: [f64; N_LEVELS],
+    costs: [f64; N_BLOCK_LEVELS],
     budget: &'a BlockBudget,
 }
 
@@ -192,7 +192,7 @@ impl<'a> Tariff<'a> {
 
     /// Bytes and cost of a level.
     fn at(&self, level: Level) -> (u64, f64) {
-        let n = n_samples(self.layout, self.layout.block(self.ordinal), level);
+        let n = self.layout.n_samples_total(self.layout.block(self.ordinal), level);
         let n = if n == 1 && self.budget.one_sample == OneSampleBlocks::Free { 0 } else { n };
         (n * self.budget.scalar.n_bytes() as u64, self.costs[usize::from(level.0)])
     }

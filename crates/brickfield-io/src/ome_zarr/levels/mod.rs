@@ -83,7 +83,7 @@ impl ZarrLevels {
         let (image, array) = &images[0];
         let (volume_axes, entries) = image.choose(&array.shape, &mut found)?;
         let dims = volume_axes.map(|axis| axis.map_or(1, |axis| array.shape[axis]));
-        let shape = CheckedShape::claim(dims, array.stored, &Limits { max_bytes: i64::MAX as u64 })?;
+        let shape = CheckedShape::claim(dims, array.stored, &Limits::UNBOUNDED)?;
         let grid = image.placement(volume_axes, options.spacing.is_some(), &mut found).grid(shape.dims)?;
         if let Some(from) = array.stored.other_than(shape.scalar) {
             found.notes.push(Note::Converted { from, to: shape.scalar });
@@ -389,7 +389,7 @@ fn dims_of(metadata: &ArrayMetadata, volume_axes: VolumeAxes) -> Result<UVec3, R
     let [Some(x), Some(y), Some(z)] = dims else {
         return Err(ReadError::field("number of array dimensions", metadata.shape.len(), "that of the finest level"));
     };
-    Ok(CheckedShape::claim([x, y, z], metadata.stored, &Limits { max_bytes: i64::MAX as u64 })?.dims)
+    Ok(CheckedShape::claim([x, y, z], metadata.stored, &Limits::UNBOUNDED)?.dims)
 }
 
 /// Scales may differ from powers of two by this part.

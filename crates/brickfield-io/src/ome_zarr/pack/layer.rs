@@ -2,23 +2,7 @@
 
 use std::ops::Range;
 
-use brickfield_core::{Scalar, ScalarType, Voxels};
-
-pub(super) fn empty(scalar: ScalarType) -> Voxels {
-    fn of<T: Scalar>() -> Voxels {
-        T::wrap(Vec::new())
-    }
-    match scalar {
-        ScalarType::U8 => of::<u8>(),
-        ScalarType::I8 => of::<i8>(),
-        ScalarType::U16 => of::<u16>(),
-        ScalarType::I16 => of::<i16>(),
-        ScalarType::U32 => of::<u32>(),
-        ScalarType::I32 => of::<i32>(),
-        ScalarType::F32 => of::<f32>(),
-        ScalarType::F64 => of::<f64>(),
-    }
-}
+use brickfield_core::Voxels;
 
 /// Appends a range of samples of the same type.
 pub(super) fn append(to: &mut Voxels, from: &Voxels, range: Range<usize>) {

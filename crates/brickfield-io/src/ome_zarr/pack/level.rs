@@ -8,8 +8,9 @@ use zarrs::storage::{WritableStorage, WritableStorageTraits};
 
 use super::super::write::data_type;
 use super::Fault;
-use super::layer::{append, empty};
+use super::layer::append;
 use crate::Compression;
+use crate::samples::room_for;
 
 /// Samples along a chunk's side; shards are one chunk deep.
 pub(super) const CHUNK_SIDE: u32 = 32;
@@ -35,13 +36,13 @@ impl LevelWriter {
         scalar: ScalarType,
         compression: Compression,
     ) -> Result<LevelWriter, Fault> {
-        let dims = ((dims - 1) >> u32::from(level.0)) + 1;
+        let dims = level.dims_of(dims);
         let whole_chunks = |n: u32| n.div_ceil(CHUNK_SIDE) * CHUNK_SIDE;
         let shard = UVec3::new(whole_chunks(dims.x), whole_chunks(dims.y), CHUNK_SIDE);
         let shard = shard.min(UVec3::new(SHARD_SIDE, SHARD_SIDE, CHUNK_SIDE));
         let metadata = serde_json::from_value(metadata(dims, shard, scalar, compression))?;
         let array = Array::new_with_metadata(store.clone(), &format!("/{}", level.0), metadata)?;
-        Ok(LevelWriter { array, dims, shard, held: empty(scalar), n_written: 0 })
+        Ok(LevelWriter { array, dims, shard, held: room_for(scalar, 0)?, n_written: 0 })
     }
 
     pub(super) fn dims(&self) -> UVec3 {
@@ -81,7 +82,7 @@ impl LevelWriter {
             append(&mut self.held, &slices, from..from + n);
             from += n;
             if self.held.len() == n_layer {
-                let layer = std::mem::replace(&mut self.held, empty(slices.scalar_type()));
+                let layer = std::mem::replace(&mut self.held, room_for(slices.scalar_type(), 0)?);
                 self.write_layer(&layer)?;
             }
         }

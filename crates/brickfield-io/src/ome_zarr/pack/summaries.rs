@@ -1,7 +1,7 @@
 //! Summaries of blocks, as an array of columns.
 
 use brickfield_core::glam::UVec3;
-use brickfield_core::{BlockLayout, BlockSide, BlockSummary, N_BLOCK_BINS, ValueRange};
+use brickfield_core::{BlockLayout, BlockSide, BlockSummary, N_BLOCK_BINS, N_BLOCK_LEVELS, ValueRange};
 use serde_json::{Value, json};
 use zarrs::array::{Array, CodecOptions};
 use zarrs::storage::{WritableStorage, WritableStorageTraits};
@@ -12,8 +12,7 @@ use super::Fault;
 pub(in super::super) const FOLDER: &str = "brickfield_blocks";
 
 /// Numbers of a summary.
-pub(in super::super) const N_COLUMNS: usize = 4 + N_LEVELS + N_BLOCK_BINS;
-const N_LEVELS: usize = 6;
+pub(in super::super) const N_COLUMNS: usize = 4 + N_BLOCK_LEVELS + N_BLOCK_BINS;
 
 /// Layers of blocks, one after the other, each a chunk.
 pub(super) struct SummaryWriter {
@@ -67,8 +66,8 @@ fn columns_of(summary: &BlockSummary) -> [f64; N_COLUMNS] {
     let BlockSummary { range, mean, counts, kept_variance, variance } = summary;
     let mut columns = [0.0; N_COLUMNS];
     columns[..4].copy_from_slice(&[range.min, range.max, *mean, *variance]);
-    columns[4..4 + N_LEVELS].iter_mut().zip(kept_variance).for_each(|(to, from)| *to = f64::from(*from));
-    columns[4 + N_LEVELS..].iter_mut().zip(counts).for_each(|(to, from)| *to = f64::from(*from));
+    columns[4..4 + N_BLOCK_LEVELS].iter_mut().zip(kept_variance).for_each(|(to, from)| *to = f64::from(*from));
+    columns[4 + N_BLOCK_LEVELS..].iter_mut().zip(counts).for_each(|(to, from)| *to = f64::from(*from));
     columns
 }
 
@@ -78,7 +77,7 @@ pub(in super::super) fn summary_of(columns: &[f64; N_COLUMNS]) -> BlockSummary {
     BlockSummary {
         range: ValueRange { min, max },
         mean,
-        counts: std::array::from_fn(|bin| columns[4 + N_LEVELS + bin] as u16),
+        counts: std::array::from_fn(|bin| columns[4 + N_BLOCK_LEVELS + bin] as u16),
         kept_variance: std::array::from_fn(|level| columns[4 + level] as f32),
         variance,
     }
@@ -86,7 +85,7 @@ pub(in super::super) fn summary_of(columns: &[f64; N_COLUMNS]) -> BlockSummary {
 
 fn column_names() -> Vec<String> {
     let names = ["least", "greatest", "mean", "variance"].map(str::to_owned).into_iter();
-    let kept = (0..N_LEVELS).map(|level| format!("part of the variance kept at level {level}"));
+    let kept = (0..N_BLOCK_LEVELS).map(|level| format!("part of the variance kept at level {level}"));
     let counts = (0..N_BLOCK_BINS).map(|bin| format!("voxels in bin {bin} of {N_BLOCK_BINS}, of 65535"));
     names.chain(kept).chain(counts).collect()
 }
