@@ -13,6 +13,8 @@ pub struct BlockPlaces {
     layout: BlockLayout,
     texels: UVec3,
     rows: Vec<BlockRow>,
+    /// The level of all blocks, if they have one and lie in the texture as in the volume.
+    natural_level: Option<Level>,
 }
 
 /// The level of a block, and its samples.
@@ -42,7 +44,8 @@ const ONE_SAMPLE: u32 = 1 << 31;
 impl BlockPlaces {
     /// The blocks of a layout, by number, in a texture of so many texels.
     pub fn new(layout: BlockLayout, texels: UVec3, rows: Vec<BlockRow>) -> BlockPlaces {
-        BlockPlaces { layout, texels, rows }
+        let natural_level = natural_level(&layout, &rows);
+        BlockPlaces { layout, texels, rows, natural_level }
     }
 
     /// Which blocks there are.
@@ -100,15 +103,9 @@ impl BlockPlaces {
     /// Not so where a block at an upper end has fewer voxels than a sample averages, and the scheme is not
     /// [`Interblock::MaximumDistance`]: the others are linear only between samples that are as far from the face.
     pub(super) fn dense_level(&self, scheme: Interblock) -> Option<Level> {
-        let level = self.rows.first()?.level;
-        let (side, end) = (self.layout.side().n_voxels() >> level.0, self.layout.n_blocks() - 1);
+        let (level, end) = (self.natural_level?, self.layout.n_blocks() - 1);
         let is_short = self.layout.extent(end).cmplt(UVec3::splat(level.stride())) & end.cmpgt(UVec3::ZERO);
-        if is_short.any() && scheme != Interblock::MaximumDistance {
-            return None;
-        }
-        let is_natural =
-            |(block, row): (UVec3, &BlockRow)| row.level == level && row.samples == BlockSamples::Texture(block * side);
-        self.layout.blocks().zip(&self.rows).all(is_natural).then_some(level)
+        (!is_short.any() || scheme == Interblock::MaximumDistance).then_some(level)
     }
 
     /// The rows as shaders read them, four words each.
@@ -163,6 +160,14 @@ impl BlockPlaces {
         }
         Ok(())
     }
+}
+
+fn natural_level(layout: &BlockLayout, rows: &[BlockRow]) -> Option<Level> {
+    let level = rows.first()?.level;
+    let side = layout.side().n_voxels() >> level.0;
+    let is_natural =
+        |(block, row): (UVec3, &BlockRow)| row.level == level && row.samples == BlockSamples::Texture(block * side);
+    layout.blocks().zip(rows).all(is_natural).then_some(level)
 }
 
 fn packed_texel(texel: UVec3) -> u32 {

@@ -69,12 +69,12 @@ impl Packing {
 
     /// Gives back the texels of a block of a level. Eight free cubes become one.
     pub fn give_back(&mut self, level: Level, texel: UVec3) {
+        let side = self.side_of(level);
         let free = &mut self.free[usize::from(level.0)];
         if level == Level(0) {
             free.insert(key(texel));
             return;
         }
-        let side = self.side.n_voxels() >> level.0;
         let parent = texel / (2 * side) * (2 * side);
         let mut others = (0..8).map(|c| parent + corner(c) * side).filter(|t| *t != texel);
         if !others.all(|t| free.contains(&key(t))) {
