@@ -1,7 +1,9 @@
 #![doc = include_str!("../README.md")]
 
 mod backends;
+mod block_residency;
 mod blocks;
+mod course;
 mod encode;
 mod picture;
 mod prepare;
@@ -16,7 +18,8 @@ pub mod options;
 pub mod overlay;
 
 pub use backends::{AdapterInfo, BackendError, BackendKind, BackendStatus, Validation, backends, open_backend};
-pub use blocks::{BlockResidency, BlockStyle, PrepareBlocksError, TransparentBlocks, prepare_blocks};
+pub use block_residency::BlockResidency;
+pub use blocks::{BlockStyle, PrepareBlocksError, TransparentBlocks, prepare_blocks};
 pub use brickfield_bricks as bricks;
 pub use brickfield_core as core;
 pub use brickfield_cpu as cpu;

@@ -6,14 +6,14 @@ use std::sync::Arc;
 use brickfield_bricks::{BlockOptions, BlockSource, build_blocks};
 use brickfield_core::{BlockSide, TransferFunction, Volume};
 use brickfield_frame::Join;
-use brickfield_io::{Opened, WorldFrame};
+use brickfield_io::WorldFrame;
 use brickfield_lod::{
     BlockBudget, BlockErrors, BlockLevels, BlockSelection, BlockView, BudgetSize, Importance, OneSampleBlocks, Slab,
     block_weights, select_block_levels,
 };
 use clap::Args;
 
-use super::{InputOptions, OptionError, ViewOptions, note, values};
+use super::{InputOptions, OptionError, ViewOptions, values};
 use crate::{BlockStyle, Scene, TransparentBlocks};
 
 /// Flat blocks instead of an octree.
@@ -67,9 +67,7 @@ impl BlockSubject {
         side: BlockSide,
         view: &ViewOptions,
     ) -> Result<BlockSubject, OptionError> {
-        let Opened { volume, frame, notes, .. } = input.open(path)?.evenly_spaced(&input.limits());
-        notes.iter().for_each(|text| note(text));
-        let transfer = view.transfer(&volume)?;
+        let (volume, frame, transfer) = input.open_to_render(path, view)?;
         let volume = Arc::new(volume);
         let blocks = build_blocks(Arc::clone(&volume), &BlockOptions { side, ..BlockOptions::default() })?;
         Ok(BlockSubject { source: Box::new(blocks), frame, transfer, volume: Some(volume) })

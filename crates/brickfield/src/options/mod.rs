@@ -246,6 +246,19 @@ impl InputOptions {
         Ok(opened?)
     }
 
+    /// Opens a volume for pictures, with the transfer function that is asked for; what the reader noticed is printed. Uneven slices are
+    /// made even.
+    fn open_to_render(
+        &self,
+        path: &Path,
+        view: &ViewOptions,
+    ) -> Result<(Volume, WorldFrame, TransferFunction), OptionError> {
+        let Opened { volume, frame, notes, .. } = self.open(path)?.evenly_spaced(&self.limits());
+        notes.iter().for_each(|text| note(text));
+        let transfer = view.transfer(&volume)?;
+        Ok((volume, frame, transfer))
+    }
+
     /// What is wanted of the file.
     fn open_options(&self) -> OpenOptions {
         let mut options = OpenOptions::from(self.limits());
@@ -284,9 +297,7 @@ impl Subject {
         tree: &TreeOptions,
         view: &ViewOptions,
     ) -> Result<Subject, OptionError> {
-        let Opened { volume, frame, notes, .. } = input.open(path)?.evenly_spaced(&input.limits());
-        notes.iter().for_each(|text| note(text));
-        let transfer = view.transfer(&volume)?;
+        let (volume, frame, transfer) = input.open_to_render(path, view)?;
         Ok(Subject { frame, tree: tree.build(&volume)?, transfer, volume })
     }
 }

@@ -194,7 +194,7 @@ fn summary(backend: &dyn Backend, scene: &Scene, plan: &FramePlan, frame: &Frame
     let d = backend.describe();
     let t = frame.timing;
     let device = t.device_ms.map(|ms| format!(", device {ms:.1} ms")).unwrap_or_default();
-    let mib = plan.field().slots().n_bytes() as f64 / f64::from(1 << 20);
+    let mib = mib(plan.field().slots().n_bytes() as u64);
     format!(
         "{}: {} ({})\n{}\n{} bricks, {mib:.1} MiB\nupload {:.1} ms, render {:.1} ms{device}, read back {:.1} ms\n",
         d.backend,
