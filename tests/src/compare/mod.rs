@@ -20,10 +20,10 @@ use crate::report::{
 
 pub use options::{CompareArgs, parse};
 pub use output::{OutputError, say};
+pub use rivals::RivalArgs;
 
 use contest::{Contest, MeasureLimits};
 use output::{OutputFolder, Pictures};
-use rivals::Rivals;
 use subject::Exhibit;
 
 /// Why a comparison could not be made.
@@ -64,9 +64,7 @@ impl CompareError {
 pub fn compare(args: &CompareArgs) -> Result<Report, CompareError> {
     let begin = Instant::now();
     let output = OutputFolder::new(&args.out)?;
-    let mut rivals = Rivals::open(&args.backends, args.adapter.as_deref());
-    rivals.check_required(&args.require)?;
-    rivals.check_any()?;
+    let mut rivals = args.rivals.open()?;
     let exhibit = subject::exhibit(args)?;
     let points = sweep::sweep_points(args, &exhibit)?;
     let (answer, reference) = answer(args, &exhibit, &output)?;

@@ -3,13 +3,14 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use brickfield::BackendKind;
 use brickfield::frame::Mode;
 use brickfield::optics::QuadratureRule;
 use brickfield::options::{InputOptions, TreeOptions, ViewOptions, values};
 use clap::builder::ArgPredicate;
 use clap::parser::ValueSource;
 use clap::{CommandFactory, FromArgMatches, Parser};
+
+use super::rivals::RivalArgs;
 
 /// Renders a scene on every backend over steps, rules and modes, and reports error against run time.
 ///
@@ -44,15 +45,9 @@ pub struct CompareArgs {
     /// Modes
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::mode, default_value = "exact,fast")]
     pub modes: Vec<Mode>,
-    /// Backends to compare
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "cpu,wgpu,ash")]
-    pub backends: Vec<BackendKind>,
-    /// Adapter of wgpu and ash: its number or a part of its name, as `brickfield backends` lists them
-    #[arg(long)]
-    pub adapter: Option<String>,
-    /// Backends without which the comparison fails (status 3)
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    pub require: Vec<BackendKind>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub rivals: RivalArgs,
     /// RMSE that the exact mode of every backend must come below (else status 4)
     #[arg(long, value_name = "RMSE", value_parser = values::positive)]
     pub reach: Option<f64>,
@@ -114,6 +109,8 @@ fn quoted(word: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use brickfield::BackendKind;
+
     use super::*;
 
     fn args(words: &str) -> Result<CompareArgs, clap::Error> {
@@ -123,7 +120,7 @@ mod tests {
     #[test]
     fn without_options_everything_is_compared_on_the_phantom() {
         let a = args("").unwrap();
-        assert_eq!((a.file.as_ref(), a.backends.len(), a.rules.len(), a.modes.len()), (None, 3, 5, 2));
+        assert_eq!((a.file.as_ref(), a.rivals.backends.len(), a.rules.len(), a.modes.len()), (None, 3, 5, 2));
         assert_eq!((a.view.size.to_array(), a.default_camera), ([128, 128], true));
         assert!(!args("--camera front").unwrap().default_camera);
         assert_eq!(args("x.vti").unwrap().view.size.to_array(), [256, 256]);
@@ -134,7 +131,7 @@ mod tests {
         let a =
             args("x.vti --steps 1,0.5,1/8 --rules gauss2,gauss2 --modes fast --backends ash,cpu --size 64x32").unwrap();
         assert_eq!((a.steps.as_slice(), a.rules.len()), (&[1.0, 0.5, 0.125][..], 1));
-        assert_eq!((a.rules[0], a.backends[1], a.view.size.y), (QuadratureRule::Gauss2, BackendKind::Cpu, 32));
+        assert_eq!((a.rules[0], a.rivals.backends[1], a.view.size.y), (QuadratureRule::Gauss2, BackendKind::Cpu, 32));
         assert!(a.command.starts_with("cargo xtask compare x.vti --steps 1,0.5,1/8"));
         assert_eq!(quoted("it's front"), r"'it'\''s front'");
     }

@@ -2,6 +2,7 @@
 
 use brickfield::frame::{Backend, Description};
 use brickfield::{BackendError, BackendKind, Validation, open_backend};
+use clap::Args;
 
 use super::CompareError;
 use crate::report::BackendInfo;
@@ -10,6 +11,33 @@ use crate::report::BackendInfo;
 pub(crate) struct Rivals {
     pub(crate) present: Vec<Box<dyn Backend>>,
     pub(crate) infos: Vec<BackendInfo>,
+}
+
+/// The backends that a comparison is made of.
+#[derive(Args, Clone, Debug)]
+pub struct RivalArgs {
+    /// Backends to compare
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "cpu,wgpu,ash")]
+    pub backends: Vec<BackendKind>,
+    /// Adapter of wgpu and ash: its number or a part of its name, as `brickfield backends` lists them
+    #[arg(long)]
+    pub adapter: Option<String>,
+    /// Backends without which the comparison fails (status 3)
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub require: Vec<BackendKind>,
+}
+
+impl RivalArgs {
+    /// Opens the backends.
+    ///
+    /// # Errors
+    /// If a required one is absent, or all are.
+    pub(crate) fn open(&self) -> Result<Rivals, CompareError> {
+        let rivals = Rivals::open(&self.backends, self.adapter.as_deref());
+        rivals.check_required(&self.require)?;
+        rivals.check_any()?;
+        Ok(rivals)
+    }
 }
 
 impl Rivals {

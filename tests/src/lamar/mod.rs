@@ -20,7 +20,7 @@ mod views;
 
 pub use args::{LamarArgs, Part};
 
-use crate::paper::{Findings, PaperError, print};
+use crate::paper::{Findings, PaperError};
 
 /// Runs the parts that `args` ask for, and prints their findings.
 ///
@@ -28,21 +28,14 @@ use crate::paper::{Findings, PaperError, print};
 /// Data or a folder that cannot be had, a scene that is refused, a backend that fails.
 pub fn lamar(args: &LamarArgs) -> Result<Findings, PaperError> {
     scenes::check_data(args)?;
-    let mut rivals = args.common.begin()?;
-    let mut findings = Findings::default();
-    for part in args.parts() {
-        print(&format!("\n## {}\n", part.title()))?;
-        findings.missed.extend(match part {
-            Part::Selection => selection::run(args)?,
-            Part::Table => table::run(args, &mut rivals)?,
-            Part::Downsampling => downsampling::run(args)?,
-            Part::Memory => memory::run(args)?,
-            Part::Seams => seams::run(args, &mut rivals)?,
-            Part::Shells => shells::run(args, &mut rivals)?,
-            Part::Figures => figures::run(args, &mut rivals)?,
-            Part::Views => views::run(args, &mut rivals)?,
-        });
-    }
-    findings.print()?;
-    Ok(findings)
+    args.common.run(args.parts(), Part::title, |part, rivals| match part {
+        Part::Selection => selection::run(args),
+        Part::Table => table::run(args, rivals),
+        Part::Downsampling => downsampling::run(args),
+        Part::Memory => memory::run(args),
+        Part::Seams => seams::run(args, rivals),
+        Part::Shells => shells::run(args, rivals),
+        Part::Figures => figures::run(args, rivals),
+        Part::Views => views::run(args, rivals),
+    })
 }

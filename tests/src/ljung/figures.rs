@@ -11,9 +11,8 @@ use super::data::{DataSet, data_sets};
 use super::schemes::{joins, style};
 use super::table::answer;
 use crate::compare::rivals::Rivals;
-use crate::paper::panels::{beside, stacked};
+use crate::paper::panels::{beside, heat_pixel, stacked};
 use crate::paper::{Missed, PaperError};
-use crate::report::heat_of_share;
 
 /// The difference at the bright end.
 const BRIGHT: f64 = 20.0;
@@ -57,8 +56,7 @@ fn difference(image: &Image<f32>, answer: &Image<f64>) -> Image<f32> {
     for (to, expected) in out.pixels_mut().iter_mut().zip(answer.pixels()) {
         let found = to.map(f64::from);
         let d = ColorMetric::CieLuv1976.of_pixels(found, *expected, [0.0; 3]);
-        let [r, g, b] = heat_of_share(d / BRIGHT).map(|c| (f32::from(c) / 255.0).powf(2.2));
-        *to = [r, g, b, 1.0];
+        *to = heat_pixel(d / BRIGHT);
     }
     out
 }

@@ -16,9 +16,8 @@ use super::LjungArgs;
 use super::schemes::{joins, name, style};
 use crate::compare::rivals::Rivals;
 use crate::metrics::quantile;
-use crate::paper::panels::{beside, stacked};
+use crate::paper::panels::{beside, heat_pixel, stacked};
 use crate::paper::{Missed, PaperError, print};
-use crate::report::heat_of_share;
 use crate::volumes::fill;
 
 /// Samples along a side.
@@ -108,11 +107,8 @@ fn gradient() -> Result<BlockVolume, PaperError> {
 
 /// A value as a grey, linear.
 fn grey(value: f64) -> LinearRgb {
-    [linear(GREYS[0] + (GREYS[1] - GREYS[0]) * value); 3]
-}
-
-fn linear(encoded: f64) -> f64 {
-    Srgb::new(encoded, encoded, encoded).into_linear::<f64>().red
+    let encoded = GREYS[0] + (GREYS[1] - GREYS[0]) * value;
+    [Srgb::new(encoded, encoded, encoded).into_linear::<f64>().red; 3]
 }
 
 fn of_scheme(
@@ -138,7 +134,8 @@ fn of_scheme(
             }
             off_border.push(difference);
         }
-        pictures.get_or_insert_with(|| [picture(&values, grey), picture(&differences, color)]);
+        pictures
+            .get_or_insert_with(|| [picture(&values, grey_pixel), picture(&differences, |d| heat_pixel(d / BRIGHT))]);
         all.extend(differences);
     }
     let mean = |d: &[f64]| d.iter().sum::<f64>() / d.len() as f64;
@@ -219,16 +216,13 @@ pub(super) fn evaluate(
     evaluates.evaluate(plan, function, inputs).map_err(|source| PaperError::Render { backend: name, source })
 }
 
-fn picture(numbers: &[f64], color: impl Fn(f64) -> LinearRgb) -> Image<f32> {
-    let pixel = |n: &f64| {
-        let [r, g, b] = color(*n).map(|c| c as f32);
-        [r, g, b, 1.0]
-    };
-    Image::new(UVec2::splat(SIDE), numbers.iter().map(pixel).collect()).expect("a pixel for each number")
+fn picture(numbers: &[f64], pixel: impl Fn(f64) -> [f32; 4]) -> Image<f32> {
+    Image::new(UVec2::splat(SIDE), numbers.iter().copied().map(pixel).collect()).expect("a pixel for each number")
 }
 
-fn color(difference: f64) -> LinearRgb {
-    heat_of_share(difference / BRIGHT).map(|c| linear(f64::from(c) / 255.0))
+fn grey_pixel(value: f64) -> [f32; 4] {
+    let [r, g, b] = grey(value).map(|c| c as f32);
+    [r, g, b, 1.0]
 }
 
 /// Maximum distance is best, the nearest block is worst; among the samples of a block errors are of rounding.

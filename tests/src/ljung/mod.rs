@@ -21,7 +21,7 @@ mod weights;
 
 pub use args::{LjungArgs, Part};
 
-use crate::paper::{Findings, PaperError, print};
+use crate::paper::{Findings, PaperError};
 
 /// Runs the parts that `args` ask for, and prints their findings.
 ///
@@ -29,22 +29,15 @@ use crate::paper::{Findings, PaperError, print};
 /// Data or a folder that cannot be had, a scene that is refused, a backend that fails.
 pub fn ljung(args: &LjungArgs) -> Result<Findings, PaperError> {
     data::check_data(args)?;
-    let mut rivals = args.common.begin()?;
-    let mut findings = Findings::default();
-    for part in args.parts() {
-        print(&format!("\n## {}\n", part.title()))?;
-        findings.missed.extend(match part {
-            Part::Gradient => gradient::run(args, &mut rivals)?,
-            Part::Weights => weights::run(args, &mut rivals)?,
-            Part::Continuity => continuity::run(args, &mut rivals)?,
-            Part::Accounting => accounting::run()?,
-            Part::Table => table::run(args, &mut rivals)?,
-            Part::Cost => cost::run(args, &mut rivals)?,
-            Part::Rank => rank::run(args)?,
-            Part::Reselect => reselect::run(args)?,
-            Part::Figures => figures::run(args, &mut rivals)?,
-        });
-    }
-    findings.print()?;
-    Ok(findings)
+    args.common.run(args.parts(), Part::title, |part, rivals| match part {
+        Part::Gradient => gradient::run(args, rivals),
+        Part::Weights => weights::run(args, rivals),
+        Part::Continuity => continuity::run(args, rivals),
+        Part::Accounting => accounting::run(),
+        Part::Table => table::run(args, rivals),
+        Part::Cost => cost::run(args, rivals),
+        Part::Rank => rank::run(args),
+        Part::Reselect => reselect::run(args),
+        Part::Figures => figures::run(args, rivals),
+    })
 }

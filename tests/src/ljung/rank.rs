@@ -1,7 +1,7 @@
 //! The estimated error of blocks against the exact one: how well they agree in order.
 
 use brickfield::bricks::{BlockSource, fetch_values};
-use brickfield::lod::{Reconstruction, Slab, exact_errors, rank_correlation};
+use brickfield::lod::{LevelErrors, Reconstruction, Slab, exact_errors, rank_correlation};
 use serde::Serialize;
 
 use super::LjungArgs;
@@ -30,10 +30,11 @@ pub(super) fn run(args: &LjungArgs) -> Result<Vec<Missed>, PaperError> {
                 fetch_values(&data.blocks, block, level)
             })?;
         let n_levels = usize::from(data.blocks.layout().side().one_sample().0);
-        let column = |errors: &[[f32; 6]], level: usize| errors.iter().map(|e| f64::from(e[level])).collect::<Vec<_>>();
+        let column =
+            |errors: &[LevelErrors], level: usize| errors.iter().map(|e| f64::from(e[level])).collect::<Vec<_>>();
         let estimated = data.errors().levels();
         let of_level = |level| rank_correlation(&column(estimated, level), &column(&exact, level));
-        let all = |errors: &[[f32; 6]]| (1..=n_levels).flat_map(|level| column(errors, level)).collect::<Vec<_>>();
+        let all = |errors: &[LevelErrors]| (1..=n_levels).flat_map(|level| column(errors, level)).collect::<Vec<_>>();
         let row = RankRow {
             data: data.name.clone(),
             per_level: (1..=n_levels).map(of_level).collect(),

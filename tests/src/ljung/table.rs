@@ -4,7 +4,7 @@ use brickfield::bricks::{BlockMemory, BlockSource, block_memory};
 use brickfield::cpu::{ContinuousOptions, continuous, discrete};
 use brickfield::frame::{Backend, Join, Mode};
 use brickfield::lod::{BlockSelection, BudgetSize};
-use brickfield::{BlockResidency, Scene, Skipping, prepare_blocks};
+use brickfield::{BlockResidency, Scene, prepare_blocks};
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Aabb, Image};
 use serde::Serialize;
@@ -159,12 +159,11 @@ impl Memory {
     }
 }
 
-/// Samples along rays, and the visible ones, of each scheme: as the f64 sum has them, without skipping.
+/// Samples along rays, and the visible ones, of each scheme: as the f64 sum has them, which looks at all.
 fn counts(data: &DataSet, selection: &BlockSelection, scene: &Scene) -> Result<Vec<(u64, u64)>, PaperError> {
-    let scene = Scene { skipping: Skipping::On, ..scene.clone() };
     let of = |join| {
         let mut residency = BlockResidency::default();
-        let plan = prepare_blocks(&data.blocks, &scene, selection.levels.levels(), style(join), &mut residency)?;
+        let plan = prepare_blocks(&data.blocks, scene, selection.levels.levels(), style(join), &mut residency)?;
         let sum = discrete(&plan);
         Ok((sum.n_samples, sum.n_visible_samples))
     };

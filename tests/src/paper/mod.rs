@@ -5,7 +5,6 @@ pub(crate) mod panels;
 
 use std::path::PathBuf;
 
-use brickfield::BackendKind;
 use brickfield::options::values;
 use brickfield::{write_exr, write_png};
 use brickfield_core::Image;
@@ -14,7 +13,7 @@ use clap::{Args, ValueEnum};
 
 pub use error::PaperError;
 
-use crate::compare::rivals::Rivals;
+use crate::compare::rivals::{RivalArgs, Rivals};
 use crate::compare::say;
 use crate::turns::Claim;
 
@@ -42,15 +41,9 @@ pub struct PaperArgs {
     /// Rounds in which contestants take turns, after one that warms up. Fewer than 6 give no interval of 95 %
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..))]
     pub frames: u32,
-    /// Backends to compare
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "cpu,wgpu,ash")]
-    pub backends: Vec<BackendKind>,
-    /// Adapter of wgpu and ash: its number or a part of its name, as `brickfield backends` lists them
-    #[arg(long)]
-    pub adapter: Option<String>,
-    /// Backends without which the comparison fails (status 3)
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    pub require: Vec<BackendKind>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub rivals: RivalArgs,
     /// Fail (status 4) if a claim does not hold: about pictures, about times (a median ratio above 1), or both
     #[arg(long, value_enum, value_name = "CLAIMS", value_delimiter = ',', require_equals = true, num_args = 0.., default_missing_values = ["pictures", "times"])]
     pub check: Vec<ClaimKind>,
@@ -94,12 +87,27 @@ pub struct Missed {
 }
 
 impl PaperArgs {
+    /// Runs the parts of a paper, each under its heading, and prints their findings.
+    pub(crate) fn run<P: Copy>(
+        &self,
+        parts: Vec<P>,
+        title: impl Fn(P) -> &'static str,
+        mut run: impl FnMut(P, &mut Rivals) -> Result<Vec<Missed>, PaperError>,
+    ) -> Result<Findings, PaperError> {
+        let mut rivals = self.begin()?;
+        let mut findings = Findings::default();
+        for part in parts {
+            print(&format!("\n## {}\n", title(part)))?;
+            findings.missed.extend(run(part, &mut rivals)?);
+        }
+        findings.print()?;
+        Ok(findings)
+    }
+
     /// Makes the output folder, opens the backends and says which there are.
-    pub(crate) fn begin(&self) -> Result<Rivals, PaperError> {
+    fn begin(&self) -> Result<Rivals, PaperError> {
         std::fs::create_dir_all(&self.out).map_err(|source| PaperError::Out { path: self.out.clone(), source })?;
-        let rivals = Rivals::open(&self.backends, self.adapter.as_deref());
-        rivals.check_required(&self.require)?;
-        rivals.check_any()?;
+        let rivals = self.rivals.open()?;
         for info in &rivals.infos {
             let state = match (&info.adapter, &info.absent) {
                 (Some(adapter), _) => format!("{adapter}, {}", info.driver.as_deref().unwrap_or_default()),
@@ -164,7 +172,7 @@ impl PaperArgs {
 
 impl Findings {
     /// The last line.
-    pub(crate) fn print(&self) -> Result<(), PaperError> {
+    fn print(&self) -> Result<(), PaperError> {
         print(&match self.missed.len() {
             0 => "\nEverything that is claimed of these parts holds.".to_owned(),
             n => format!("\nOf what is claimed, {n} does not hold."),

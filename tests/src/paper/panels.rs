@@ -2,6 +2,16 @@
 
 use brickfield_core::Image;
 use brickfield_core::glam::UVec2;
+use palette::{LinSrgb, Srgb};
+
+use crate::report::heat_of_share;
+
+/// A pixel in the colour of a share of the scale of differences, linear.
+pub(crate) fn heat_pixel(share: f64) -> [f32; 4] {
+    let [r, g, b] = heat_of_share(share).map(|c| f32::from(c) / 255.0);
+    let linear: LinSrgb<f32> = Srgb::new(r, g, b).into_linear();
+    [linear.red, linear.green, linear.blue, 1.0]
+}
 
 /// Pictures of one height, side by side, a few pixels apart.
 pub(crate) fn beside(images: &[Image<f32>]) -> Image<f32> {

@@ -9,7 +9,7 @@ use brickfield_optics::QuadratureRule;
 
 use super::fields::{COOL, WARM, grid, hills, knot, skew_grid, soft, sparse};
 use super::functions::function;
-use super::setup::{BlockLevels, Setup, catches, picture};
+use super::setup::{FlatLevels, Setup, catches, picture};
 use crate::conformance::case::{Case, FunctionPoint};
 use crate::conformance::plan_mutants::PlanMutant::*;
 use crate::conformance::shader_mutants as shader;
@@ -22,7 +22,7 @@ fn blended(scheme: Interblock) -> BlockStyle {
 
 /// Blocks of random resolutions, the last ones short.
 fn random(scalar: ScalarType, side: BlockSide, style: BlockStyle) -> Setup {
-    Setup::new(hills(&grid(), scalar), soft(scalar)).blocks(side, BlockLevels::Random, style)
+    Setup::new(hills(&grid(), scalar), soft(scalar)).blocks(side, FlatLevels::Random, style)
 }
 
 const NEAREST: BlockStyle = BlockStyle { join: Join::Shared, transparent: TransparentBlocks::Empty };
@@ -61,7 +61,7 @@ fn pictures() -> Vec<Case> {
         }),
         picture("blocks/boundary-split-f32", catches![shader::SPLIT_SWAPPED], move || {
             let volume = hills(&skew_grid(), f32);
-            Setup::new(volume, soft(f32)).blocks(BlockSide::V32, BlockLevels::Random, blended(BoundarySplit))
+            Setup::new(volume, soft(f32)).blocks(BlockSide::V32, FlatLevels::Random, blended(BoundarySplit))
         }),
         picture("blocks/gauss2", catches![shader::LITERAL_WEIGHTS, shader::GAUSS_NODE], move || {
             random(u16, BlockSide::V8, blended(MaximumDistance)).rule(QuadratureRule::Gauss2)
@@ -83,7 +83,7 @@ fn pictures() -> Vec<Case> {
         picture("blocks/all-of-level-2", catches![shader::NEAREST, DecodeOffset], move || {
             Setup::new(hills(&grid(), u16), soft(u16)).blocks(
                 BlockSide::V8,
-                BlockLevels::All(Level(2)),
+                FlatLevels::All(Level(2)),
                 blended(MaximumDistance),
             )
         }),
@@ -94,7 +94,7 @@ fn pictures() -> Vec<Case> {
             let knots = [knot(0.3, 0.0, WARM), knot(0.9, 0.5, COOL)];
             let transfer = spread(&knots, u8).expect("knots ascend");
             let grid = Grid::axis_aligned(UVec3::new(71, 66, 53), DVec3::ONE).expect("a grid");
-            Setup::new(sparse(&grid, u8), transfer).blocks(BlockSide::V8, BlockLevels::Random, blended(MaximumDistance))
+            Setup::new(sparse(&grid, u8), transfer).blocks(BlockSide::V8, FlatLevels::Random, blended(MaximumDistance))
         }),
     ]
 }
@@ -104,7 +104,7 @@ fn equal() -> Vec<Case> {
     let case = |scheme: Interblock, side, scalar| {
         let name = format!("blocks/equal-{}", scheme.name());
         picture(name, catches![shader::NEAREST, shader::LERP_SWAPPED, DecodeOffset], move || {
-            Setup::new(hills(&grid(), scalar), soft(scalar)).blocks(side, BlockLevels::All(Level(0)), blended(scheme))
+            Setup::new(hills(&grid(), scalar), soft(scalar)).blocks(side, FlatLevels::All(Level(0)), blended(scheme))
         })
     };
     vec![

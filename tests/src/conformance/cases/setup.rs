@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use brickfield::bricks::{BlockOptions, BlockSource, BuildOptions, Downsampling, build_blocks, build_tree};
-use brickfield::lod::Criterion;
+use brickfield::lod::{BlockLevels, Criterion};
 use brickfield::{BlockStyle, Scene};
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{
@@ -23,34 +23,30 @@ pub(super) struct Setup {
     shows: Shows,
     triangles_at_a_time: Option<u32>,
     storage: Storage,
-    blocks: Option<(BlockSide, BlockLevels, BlockStyle)>,
+    blocks: Option<(BlockSide, FlatLevels, BlockStyle)>,
     scene: Scene,
 }
 
 /// The levels of flat blocks.
 #[derive(Clone, Copy)]
-pub(super) enum BlockLevels {
+pub(super) enum FlatLevels {
     /// All blocks have this one.
     All(Level),
     /// Random ones, from the finest to one sample.
     Random,
 }
 
-impl BlockLevels {
-    fn of(self, layout: &BlockLayout) -> Vec<Level> {
-        let n_levels = u64::from(layout.side().one_sample().0) + 1;
-        let mut state = 0x9e37_79b9_7f4a_7c15u64;
-        let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            Level(((state >> 33) % n_levels) as u8)
-        };
-        let level = |_| match self {
-            BlockLevels::All(level) => level,
-            BlockLevels::Random => random(),
-        };
-        (0..layout.n_blocks_total()).map(level).collect()
+impl FlatLevels {
+    fn of(self, layout: BlockLayout) -> BlockLevels {
+        match self {
+            FlatLevels::All(level) => BlockLevels::uniform(layout, level),
+            FlatLevels::Random => BlockLevels::random(layout, SEED),
+        }
     }
 }
+
+/// Of random levels.
+const SEED: u64 = 1;
 
 #[derive(Clone, Copy)]
 enum OracleKind {
@@ -104,9 +100,9 @@ impl Setup {
     }
 
     /// Draws flat blocks; the volume's own samples know of those at full resolution.
-    pub(super) fn blocks(self, side: BlockSide, levels: BlockLevels, style: BlockStyle) -> Setup {
+    pub(super) fn blocks(self, side: BlockSide, levels: FlatLevels, style: BlockStyle) -> Setup {
         let oracle = match levels {
-            BlockLevels::All(Level(0)) => self.oracle,
+            FlatLevels::All(Level(0)) => self.oracle,
             _ => OracleKind::None,
         };
         Setup { oracle, blocks: Some((side, levels, style)), ..self }
@@ -176,7 +172,7 @@ impl Setup {
         let blocks = self.blocks.map(|(side, levels, style)| {
             let volume = build_blocks(Arc::new(self.volume.clone()), &BlockOptions { side, ..BlockOptions::default() });
             let volume = volume.expect("a case's blocks fit");
-            FlatBlocks { levels: levels.of(volume.layout()), volume, style }
+            FlatBlocks { levels: levels.of(*volume.layout()).levels().to_vec(), volume, style }
         });
         let volume = Box::new(self.volume);
         let oracle = match self.oracle {
