@@ -18,6 +18,8 @@ const N_LEVELS: usize = 6;
 /// Layers of blocks, one after the other, each a chunk.
 pub(super) struct SummaryWriter {
     array: Array<dyn WritableStorageTraits>,
+    key: String,
+    metadata: Value,
     side: BlockSide,
     n_blocks: UVec3,
     n_layers: u32,
@@ -26,9 +28,11 @@ pub(super) struct SummaryWriter {
 impl SummaryWriter {
     pub(super) fn new(store: &WritableStorage, dims: UVec3, side: BlockSide) -> Result<SummaryWriter, Fault> {
         let n_blocks = BlockLayout::new(dims, side).n_blocks();
-        let metadata = serde_json::from_value(metadata(n_blocks))?;
-        let array = Array::new_with_metadata(store.clone(), &format!("/{FOLDER}/{side}"), metadata)?;
-        Ok(SummaryWriter { array, side, n_blocks, n_layers: 0 })
+        let metadata = metadata(n_blocks);
+        let path = format!("/{FOLDER}/{side}");
+        let array = Array::new_with_metadata(store.clone(), &path, serde_json::from_value(metadata.clone())?)?;
+        let key = format!("{FOLDER}/{side}/zarr.json");
+        Ok(SummaryWriter { array, key, metadata, side, n_blocks, n_layers: 0 })
     }
 
     pub(super) fn side(&self) -> BlockSide {
@@ -58,8 +62,9 @@ impl SummaryWriter {
         Ok(())
     }
 
-    pub(super) fn write_metadata(&self) -> Result<(), Fault> {
-        Ok(self.array.store_metadata()?)
+    /// The metadata, and their key. Those that `zarrs` writes have codecs by bare names, which not every reader takes.
+    pub(super) fn metadata(&self) -> (String, &Value) {
+        (self.key.clone(), &self.metadata)
     }
 }
 
