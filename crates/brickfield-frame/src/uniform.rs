@@ -63,8 +63,8 @@ pub struct FrameUniforms {
     pub counted_from: f32,
     /// Where the first index cell begins.
     pub index_origin: [f32; 3],
-    /// Nothing.
-    pub padding_0: f32,
+    /// Steps of level 0 between two samples of a field that is one array of samples.
+    pub dense_stride: f32,
     /// Cells of the index.
     pub index_dims: [u32; 3],
     /// Number of knots.
@@ -177,7 +177,7 @@ impl FrameUniforms {
             facet_columns: rays.facet_squares().x,
             planes_high: float3(rays.planes.high),
             voxel_world: float3(rays.planes.voxel_world),
-            padding_0: 0.0,
+            dense_stride: field.dense_level().map_or(1.0, |level| level.stride() as f32),
             padding_1: 0.0,
             padding_2: 0.0,
             padding_3: 0.0,

@@ -65,6 +65,11 @@ impl Frustum {
         Frustum { planes: [side(right, half.x), side(-right, half.x), side(up, half.y), side(-up, half.y), eye] }
     }
 
+    /// Whether a ray may reach an index-space box.
+    pub(crate) fn reaches(&self, b: &Aabb) -> bool {
+        self.crossed(b, Planes::ALL).is_some()
+    }
+
     /// Which of `planes` the index-space box crosses; `None` if it lies wholly outside one of them.
     fn crossed(&self, b: &Aabb, planes: Planes) -> Option<Planes> {
         let (center, half) = (b.center(), b.extent() * 0.5);

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod blocks;
 mod criterion;
 mod filter;
 mod frustum;
@@ -7,6 +8,11 @@ mod order;
 mod select;
 mod tile;
 
+pub use blocks::{
+    BlockBudget, BlockErrors, BlockLevels, BlockLevelsError, BlockSelection, BlockView, BudgetError, BudgetSize,
+    EstimateError, Importance, LevelErrors, N_LEVELS, OneSampleBlocks, Reconstruction, Slab, SlabError, block_weights,
+    changed_values, exact_errors, rank_correlation, select_block_levels,
+};
 pub use criterion::{Criterion, CriterionInView};
 pub use filter::{And, Answer, Filter};
 pub use frustum::{Frustum, Planes};

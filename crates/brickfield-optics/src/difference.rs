@@ -91,6 +91,12 @@ fn summary(mut differences: Vec<f64>) -> ColorDifferences {
     ColorDifferences { mean, percentile_95: *percentile_95, max }
 }
 
+/// L*, u*, v* (CIE 1976) of an opaque colour, linear RGB: the distance of two is [`ColorMetric::CieLuv1976`].
+pub fn cie_luv(color: LinearRgb) -> [f64; 3] {
+    let Luv { l, u, v, .. } = luv(color);
+    [l, u, v]
+}
+
 fn luv_distance(left: LinearRgb, right: LinearRgb) -> f64 {
     let (a, b) = (luv(left), luv(right));
     (a.l - b.l).hypot(a.u - b.u).hypot(a.v - b.v)
@@ -164,6 +170,8 @@ mod tests {
             let (x, y) = (luv_by_hand(a), luv_by_hand(b));
             let expected = (x[0] - y[0]).hypot(x[1] - y[1]).hypot(x[2] - y[2]);
             let found = ColorMetric::CieLuv1976.of_colors(a, b);
+            let [p, q] = [cie_luv(a), cie_luv(b)];
+            prop_assert!(((p[0] - q[0]).hypot(p[1] - q[1]).hypot(p[2] - q[2]) - found).abs() < 1e-9);
             prop_assert!((found - expected).abs() < 0.1 + 1e-3 * expected, "{found} {expected}");
         }
 

@@ -11,6 +11,7 @@ pub(crate) fn linear_of_hex(hex: u32) -> LinearRgb {
 }
 
 /// Linear RGB of `#RRGGBB`.
+#[cfg(any(feature = "files", test))]
 pub(crate) fn linear_of_text(text: &str) -> Option<LinearRgb> {
     let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
     u32::from_str_radix(digits, 16).ok().map(linear_of_hex)

@@ -27,7 +27,7 @@ const fn one_of(path: &'static str, name: &'static str, text: &'static str) -> M
     Module { name, path, text: Cow::Borrowed(text) }
 }
 
-const EMBEDDED: [Module; 21] = [
+const EMBEDDED: [Module; 22] = [
     own("frame", include_str!("wesl/frame.wesl")),
     own("scalar", include_str!("wesl/scalar.wesl")),
     own("transfer", include_str!("wesl/transfer.wesl")),
@@ -37,6 +37,7 @@ const EMBEDDED: [Module; 21] = [
     one_of("field", "field/bricks", include_str!("wesl/field/bricks.wesl")),
     one_of("field", "field/placed", include_str!("wesl/field/placed.wesl")),
     one_of("field", "field/blocks", include_str!("wesl/field/blocks.wesl")),
+    one_of("field", "field/dense", include_str!("wesl/field/dense.wesl")),
     own("interblock", include_str!("wesl/interblock.wesl")),
     own("quadrature", include_str!("wesl/quadrature.wesl")),
     own("preintegrated", include_str!("wesl/preintegrated.wesl")),

@@ -41,17 +41,20 @@ pub enum FieldKind {
     Placed,
     /// Flat blocks: a row for each says its level and its first texel.
     Blocks(Join),
+    /// Flat blocks that are blended, all of one level and in their order: one array of samples.
+    Dense,
 }
 
 impl FieldKind {
     /// All kinds.
-    pub const ALL: [FieldKind; 6] = [
+    pub const ALL: [FieldKind; 7] = [
         FieldKind::Bricks,
         FieldKind::Placed,
         FieldKind::Blocks(Join::Shared),
         FieldKind::Blocks(Join::Blend(Interblock::MinimumDistance)),
         FieldKind::Blocks(Join::Blend(Interblock::BoundarySplit)),
         FieldKind::Blocks(Join::Blend(Interblock::MaximumDistance)),
+        FieldKind::Dense,
     ];
 
     /// The kind of a plan's field.
@@ -59,6 +62,7 @@ impl FieldKind {
         match plan.field().slots().places() {
             Places::Even(_) => FieldKind::Bricks,
             Places::Table { .. } => FieldKind::Placed,
+            Places::Blocks(_) if plan.field().dense_level().is_some() => FieldKind::Dense,
             Places::Blocks(_) => FieldKind::Blocks(plan.field().join()),
         }
     }
@@ -68,6 +72,7 @@ impl FieldKind {
             FieldKind::Bricks => "field/bricks",
             FieldKind::Placed => "field/placed",
             FieldKind::Blocks(_) => "field/blocks",
+            FieldKind::Dense => "field/dense",
         }
     }
 

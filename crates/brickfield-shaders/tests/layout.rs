@@ -76,6 +76,8 @@ fn assert_rows() {
         end_segment,
         last_sample,
         counted_from,
+        index_origin,
+        dense_stride,
         index_dims,
         n_knots,
         atlas_bricks,
@@ -93,7 +95,7 @@ fn assert_rows() {
     let library = brickfield_shaders::ShaderLibrary::embedded();
     let (_, text) = library.modules().find(|(name, _)| *name == "frame").unwrap();
     let functions: Vec<&str> = text.split("\nfn ").skip(1).collect();
-    assert_eq!(functions.len(), 18);
+    assert_eq!(functions.len(), 19);
     for function in functions {
         let name = function.split('(').next().unwrap();
         let read = function.split("return frame.").nth(1).unwrap().split(';').next().unwrap();

@@ -48,7 +48,7 @@ fn variant(options: &[usize; N_OPTIONS]) -> Option<Variant> {
     let Segments { surfaces, division, lengths } = variant.segments;
     let is_nominal = lengths == Lengths::Nominal;
     let is_drawn = surfaces != Surfaces::Shells && division == Division::Brick && !variant.long_rays;
-    let is_of_blocks = matches!(variant.field, FieldKind::Blocks(_));
+    let is_of_blocks = matches!(variant.field, FieldKind::Blocks(_) | FieldKind::Dense);
     let is_asked_for = (!is_nominal || variant.rule == QuadratureRule::MidpointExponential)
         && (variant.entry != Entry::Proxy || is_drawn)
         && (variant.field == FieldKind::Bricks || !features.contains(Feature::SkipMacrocells))

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::encode::encode;
 use crate::prepare::{Course, check_size, check_values, segment_reach, to_sample_space};
-use crate::{Copied, PrepareError, Scene, Skipping, Technique};
+use crate::{Copied, PrepareError, Quality, Scene, Skipping, Technique};
 
 /// How flat blocks are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -71,10 +71,19 @@ pub struct BlockResidency {
 #[derive(Debug)]
 struct Held {
     source: SourceId,
-    packing: Packing,
+    arrangement: Arrangement,
     rows: Vec<BlockRow>,
     chunks: Vec<Option<Arc<Chunk>>>,
     field: Option<Field>,
+}
+
+/// How blocks lie in the texture.
+#[derive(Debug)]
+enum Arrangement {
+    /// As in the volume: all of one level.
+    Dense { level: Level, texels: UVec3 },
+    /// Without gaps.
+    Packed(Packing),
 }
 
 /// Texels along the sides of a texture, at most: every Vulkan device takes so many along x and y, and as many layers as rows tell
@@ -101,6 +110,10 @@ pub fn prepare_blocks(
     let coarsest = levels.iter().copied().max().unwrap_or(Level(0));
     let Course { domain, sampling, rays } = Course::new(source.grid(), scene, coarsest)?;
     residency.hold(source, levels)?;
+    let style = match scene.quality {
+        Quality::Final => style,
+        Quality::Draft => BlockStyle { join: Join::Shared, ..style },
+    };
     let drawn = drawn_blocks(source, scene, style, &domain);
     let field = residency.field(source, &drawn, style.join);
     let drawing = match scene.technique {
@@ -209,13 +222,18 @@ impl BlockResidency {
 
     /// Texels of the texture that hold no sample.
     pub fn n_free_texels(&self) -> u64 {
-        self.held.as_ref().map_or(0, |held| held.packing.n_free())
+        self.held.as_ref().map_or(0, |held| match &held.arrangement {
+            Arrangement::Dense { .. } => 0,
+            Arrangement::Packed(packing) => packing.n_free(),
+        })
     }
 
     /// Fetches the blocks that have another level than before.
     fn hold(&mut self, source: &dyn BlockSource, levels: &[Level]) -> Result<(), FetchError> {
         self.copied = Copied::default();
-        let before = self.held.as_ref().filter(|held| held.source == source.id());
+        let dense = dense_texels(source.layout(), levels);
+        let is_kept = |held: &Held| held.source == source.id() && held.dense_level() == dense.map(|(level, _)| level);
+        let before = self.held.as_ref().filter(|held| is_kept(held));
         let is_new = |i: &usize| before.is_none_or(|held| held.rows[*i].level != levels[*i]);
         let new: Vec<usize> = (0..levels.len()).filter(is_new).collect();
         let coding = Coding::of(source);
@@ -223,8 +241,8 @@ impl BlockResidency {
             new.par_iter().map(|i| coding.fetch(source, *i, levels[*i])).collect::<Result<_, _>>()?;
         self.copied = Copied { n_bricks: new.len(), n_bytes: fetched.iter().map(Vec::len).sum() };
         let mut held = match self.held.take() {
-            Some(held) if held.source == source.id() => held,
-            _ => Held::empty(source, levels),
+            Some(held) if is_kept(&held) => held,
+            _ => Held::empty(source, levels, dense),
         };
         held.put(source.layout(), coding.format, &new, levels, fetched);
         if held.is_too_large(source.layout()) {
@@ -238,7 +256,7 @@ impl BlockResidency {
     fn field(&mut self, source: &dyn BlockSource, drawn: &[bool], join: Join) -> Field {
         let held = self.held.as_mut().expect("blocks are held before they are a field");
         let (layout, coding) = (*source.layout(), Coding::of(source));
-        let places = BlockPlaces::new(layout, held.packing.texels(), held.rows.clone());
+        let places = BlockPlaces::new(layout, held.texels(), held.rows.clone());
         let decode = coding.stored.rescaled(source.rescale());
         let slots = Slots::new(coding.format, decode, Places::Blocks(places), held.chunks.clone());
         let slots = slots.expect("blocks fill their places");
@@ -258,16 +276,30 @@ impl BlockResidency {
 }
 
 impl Held {
-    fn empty(source: &dyn BlockSource, levels: &[Level]) -> Held {
+    fn empty(source: &dyn BlockSource, levels: &[Level], dense: Option<(Level, UVec3)>) -> Held {
         let (layout, side) = (source.layout(), source.layout().side());
-        let n_cubes = n_cubes(side, levels.iter().enumerate().map(|(i, level)| cube_level(layout, i, *level)));
+        let cubes = levels.iter().enumerate().map(|(i, level)| cube_level(layout, i, *level));
+        let arrangement = match dense {
+            Some((level, texels)) => Arrangement::Dense { level, texels },
+            None => Arrangement::Packed(Packing::new(side, n_cubes(side, cubes), MAX_TEXELS)),
+        };
         let row = BlockRow { level: side.one_sample(), samples: BlockSamples::One(0.0) };
-        Held {
-            source: source.id(),
-            packing: Packing::new(side, n_cubes, MAX_TEXELS),
-            rows: vec![row; levels.len()],
-            chunks: vec![None; levels.len()],
-            field: None,
+        let (rows, chunks) = (vec![row; levels.len()], vec![None; levels.len()]);
+        Held { source: source.id(), arrangement, rows, chunks, field: None }
+    }
+
+    fn dense_level(&self) -> Option<Level> {
+        match self.arrangement {
+            Arrangement::Dense { level, .. } => Some(level),
+            Arrangement::Packed(_) => None,
+        }
+    }
+
+    /// The texture's size.
+    fn texels(&self) -> UVec3 {
+        match &self.arrangement {
+            Arrangement::Dense { texels, .. } => *texels,
+            Arrangement::Packed(packing) => packing.texels(),
         }
     }
 
@@ -281,19 +313,22 @@ impl Held {
         fetched: Vec<Vec<u8>>,
     ) {
         for i in new {
-            if let BlockSamples::Texture(texel) = self.rows[*i].samples {
-                self.packing.give_back(cube_level(layout, *i, self.rows[*i].level), texel);
+            if let (BlockSamples::Texture(texel), Arrangement::Packed(packing)) =
+                (self.rows[*i].samples, &mut self.arrangement)
+            {
+                packing.give_back(cube_level(layout, *i, self.rows[*i].level), texel);
             }
         }
         // The largest first: then none of them is cut for a smaller one while others wait.
         let mut order: Vec<(usize, Vec<u8>)> = new.iter().copied().zip(fetched).collect();
         order.sort_by_key(|(i, _)| cube_level(layout, *i, levels[*i]));
         for (i, bytes) in order {
-            let samples = match bytes.len() == format.n_bytes() {
+            let is_one = bytes.len() == format.n_bytes() && self.dense_level().is_none();
+            let samples = match is_one {
                 true => BlockSamples::One(format.read(&bytes, 0) as f32),
-                false => BlockSamples::Texture(self.packing.take(cube_level(layout, i, levels[i]))),
+                false => BlockSamples::Texture(self.arrangement.take(layout, i, levels[i])),
             };
-            self.chunks[i] = matches!(samples, BlockSamples::Texture(_)).then(|| Arc::new(Chunk::new(bytes)));
+            self.chunks[i] = (!is_one).then(|| Arc::new(Chunk::new(bytes)));
             self.rows[i] = BlockRow { level: levels[i], samples };
         }
     }
@@ -306,20 +341,39 @@ impl Held {
 
     fn is_too_large(&self, layout: &BlockLayout) -> bool {
         let side = u64::from(layout.side().n_voxels());
-        let n_held = self.packing.texels().as_u64vec3().element_product() / side.pow(3);
-        n_held > TOO_LARGE * self.n_cubes(layout) + FEW_CUBES
+        let n_held = self.texels().as_u64vec3().element_product() / side.pow(3);
+        self.dense_level().is_none() && n_held > TOO_LARGE * self.n_cubes(layout) + FEW_CUBES
     }
 
     /// Moves all blocks together. Each is another content, for its place is another.
     fn pack_anew(&mut self, layout: &BlockLayout) {
-        self.packing = Packing::new(layout.side(), self.n_cubes(layout), MAX_TEXELS);
+        self.arrangement = Arrangement::Packed(Packing::new(layout.side(), self.n_cubes(layout), MAX_TEXELS));
         let mut order: Vec<usize> = (0..self.rows.len()).filter(|i| self.chunks[*i].is_some()).collect();
         order.sort_by_key(|i| cube_level(layout, *i, self.rows[*i].level));
         for i in order {
-            self.rows[i].samples = BlockSamples::Texture(self.packing.take(cube_level(layout, i, self.rows[i].level)));
+            self.rows[i].samples = BlockSamples::Texture(self.arrangement.take(layout, i, self.rows[i].level));
             self.chunks[i] = self.chunks[i].as_ref().map(|chunk| Arc::new(Chunk::new(chunk.bytes())));
         }
     }
+}
+
+impl Arrangement {
+    /// The first texel of a block.
+    fn take(&mut self, layout: &BlockLayout, ordinal: usize, level: Level) -> UVec3 {
+        match self {
+            Arrangement::Dense { .. } => layout.block(ordinal) * (layout.side().n_voxels() >> level.0),
+            Arrangement::Packed(packing) => packing.take(cube_level(layout, ordinal, level)),
+        }
+    }
+}
+
+/// The level of all blocks and their texels as in the volume, if all have one of several samples and the texture is none too large.
+fn dense_texels(layout: &BlockLayout, levels: &[Level]) -> Option<(Level, UVec3)> {
+    let level = *levels.first()?;
+    let end = layout.n_blocks() - 1;
+    let texels = end * (layout.side().n_voxels() >> level.0) + layout.n_samples(end, level);
+    let fits = level < layout.side().one_sample() && texels.max_element() <= MAX_TEXELS;
+    (fits && levels.iter().all(|other| *other == level)).then_some((level, texels))
 }
 
 /// Cubes of a block's side that cubes of some levels fill.
@@ -351,5 +405,104 @@ impl Coding {
         let mut bytes = Vec::new();
         source.fetch(source.layout().block(ordinal), level, &mut bytes)?;
         Ok(encode(bytes, source.scalar_type(), self.format, self.stored))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use brickfield_bricks::{BlockOptions, BlockVolume, build_blocks};
+    use brickfield_core::glam::{DVec3, UVec2};
+    use brickfield_core::{Camera, Grid, Interblock, Knot, Volume};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::{BackendKind, Validation, open_backend};
+
+    const BLENDED: BlockStyle =
+        BlockStyle { join: Join::Blend(Interblock::MaximumDistance), transparent: TransparentBlocks::Empty };
+
+    fn blocks(dims: UVec3) -> BlockVolume {
+        let grid = Grid::axis_aligned(dims, DVec3::ONE).unwrap();
+        let voxels: Vec<u16> =
+            (0..grid.n_voxels() as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 16) as u16).collect();
+        let volume = Arc::new(Volume::new(grid, voxels).unwrap());
+        build_blocks(volume, &BlockOptions { side: BlockSide::V8, ..BlockOptions::default() }).unwrap()
+    }
+
+    fn scene(source: &dyn BlockSource) -> Scene {
+        let camera = Camera::framing(&source.grid().world_box(), DVec3::new(1.0, 2.0, 3.0), DVec3::Z).unwrap();
+        let knot = |value: f64, extinction: f64| Knot { value, extinction, color: [0.2, 0.5, 1.0] };
+        let transfer = TransferFunction::new(vec![knot(0.0, 0.01), knot(65535.0, 0.2)]).unwrap();
+        Scene::new(camera, UVec2::new(16, 16), transfer)
+    }
+
+    /// The samples of a block, wherever they are kept.
+    fn kept(plan: &FramePlan, i: usize) -> Vec<u8> {
+        let slots = plan.field().slots();
+        match slots.samples(i as u32) {
+            Some(chunk) => chunk.bytes().to_vec(),
+            None => (slots.one_sample(i as u32).unwrap() as u16).to_le_bytes().to_vec(),
+        }
+    }
+
+    #[test]
+    fn a_draft_takes_longer_steps_and_the_nearest_block_and_brings_nothing() {
+        let source = blocks(UVec3::new(20, 17, 9));
+        let levels: Vec<Level> = (0..source.layout().n_blocks_total()).map(|i| Level(i as u8 % 4)).collect();
+        let (last, mut residency) = (scene(&source), BlockResidency::default());
+        let mut plan = |scene: &Scene, style| prepare_blocks(&source, scene, &levels, style, &mut residency).unwrap();
+        let fine = plan(&last, BLENDED);
+        let draft = plan(&Scene { quality: Quality::Draft, ..last.clone() }, BLENDED);
+        let stated = plan(&Scene { step_voxels: 1.0, ..last }, BlockStyle { join: Join::Shared, ..BLENDED });
+        let mut backend = open_backend(BackendKind::Cpu, None, Validation::Off).unwrap();
+        let mut picture = |plan: &FramePlan| backend.render(plan).unwrap().image;
+        assert_eq!(picture(&draft), picture(&stated));
+        assert_ne!(picture(&draft), picture(&fine));
+        let chunks =
+            |plan: &FramePlan| plan.field().slots().all_samples().iter().flatten().map(|c| c.id()).collect::<Vec<_>>();
+        assert_eq!((chunks(&draft), residency.copied().n_bytes), (chunks(&fine), 0));
+    }
+
+    #[test]
+    fn levels_that_are_none_are_named() {
+        let source = blocks(UVec3::new(20, 8, 8));
+        let error = |levels: &[Level]| {
+            let plan = prepare_blocks(&source, &scene(&source), levels, BLENDED, &mut BlockResidency::default());
+            plan.unwrap_err().to_string()
+        };
+        assert!(error(&[Level(0); 2]).contains("2 levels for 3 flat blocks"));
+        assert!(
+            error(&[Level(0), Level(4), Level(0)])
+                .contains("block (1, 0, 0) at level 4; blocks of 8 voxels have levels up to 3")
+        );
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn blocks_keep_their_samples_and_places_from_frame_to_frame(
+            frames in prop::collection::vec(prop::collection::vec(0..4u8, 3 * 3 * 2), 1..5)
+        ) {
+            let source = blocks(UVec3::new(20, 17, 9));
+            let (scene, mut residency) = (scene(&source), BlockResidency::default());
+            let mut before: Option<(Vec<Level>, FramePlan)> = None;
+            for levels in frames {
+                let levels: Vec<Level> = levels.into_iter().map(Level).collect();
+                let plan = prepare_blocks(&source, &scene, &levels, BLENDED, &mut residency).unwrap();
+                for (i, level) in levels.iter().enumerate() {
+                    let mut expected = Vec::new();
+                    source.fetch(source.layout().block(i), *level, &mut expected).unwrap();
+                    prop_assert_eq!(kept(&plan, i), expected);
+                }
+                let changed = |(last, _): &(Vec<Level>, FramePlan)| last.iter().zip(&levels).filter(|(a, b)| a != b).count();
+                let copied = residency.copied().n_bricks;
+                if let Some(before) = &before {
+                    let is_dense = |plan: &FramePlan| plan.field().dense_level();
+                    prop_assert!(copied == changed(before) || is_dense(&before.1) != is_dense(&plan));
+                }
+                before = Some((levels, plan));
+            }
+        }
     }
 }

@@ -34,7 +34,7 @@ pub use pack::{PackError, PackProgress, Packed, pack};
 pub use picture::{PictureError, PictureFormat, check_picture_path, srgb8, write_exr, write_picture, write_png};
 pub use prepare::{MAX_FACETS, MAX_IMAGE, MAX_POLYGONS, MAX_SEGMENTS, PrepareError, prepare, prepare_selection};
 pub use residency::{Copied, Residency};
-pub use scene::{Scene, Skipping, Technique};
+pub use scene::{Quality, Scene, Skipping, Technique};
 #[cfg(feature = "formats")]
 pub use store::{StoreBlocks, StoreLimits, SummaryProgress};
 pub use viewpoint::{Viewpoint, ViewpointError};

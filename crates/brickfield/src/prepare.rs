@@ -215,7 +215,7 @@ impl Course {
     /// `coarsest` is the coarsest level that is drawn.
     pub(crate) fn new(grid: &Grid, scene: &Scene, coarsest: Level) -> Result<Course, PrepareError> {
         let domain = clipped_domain(grid, scene.clip)?;
-        let step_world = scene.step_voxels * grid.spacing().min_element();
+        let step_world = scene.quality.step(scene.step_voxels) * grid.spacing().min_element();
         if !(step_world.is_finite() && step_world > 0.0) {
             return Err(PrepareError::Step { step_voxels: scene.step_voxels });
         }
@@ -279,7 +279,7 @@ pub(crate) fn segment_reach(grid: &Grid, scene: &Scene, n_cells: u32) -> u32 {
     let turn = grid.world_to_index().matrix3;
     let voxels_per_unit =
         [turn.x_axis, turn.y_axis, turn.z_axis].into_iter().map(DVec3::length_squared).sum::<f64>().sqrt();
-    let voxels = scene.step_voxels * grid.spacing().min_element() * voxels_per_unit;
+    let voxels = scene.quality.step(scene.step_voxels) * grid.spacing().min_element() * voxels_per_unit;
     (voxels / f64::from(n_cells)).ceil().min(f64::from(u32::MAX)) as u32
 }
 

@@ -35,6 +35,32 @@ pub struct Scene {
     pub skipping: Skipping,
     /// How backends that can do both make the picture.
     pub technique: Technique,
+    /// Draft while the camera moves, final when it rests.
+    pub quality: Quality,
+}
+
+/// How much of a frame's time is spent on its looks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Quality {
+    /// The scene as it is stated.
+    #[default]
+    Final,
+    /// Steps of [`Quality::DRAFT_STEPS`] times the length, and of flat blocks the nearest one alone. The same samples stay
+    /// resident: nothing is brought to a device when quality changes.
+    Draft,
+}
+
+impl Quality {
+    /// Steps of a final frame in one of a draft.
+    pub const DRAFT_STEPS: f64 = 2.0;
+
+    /// The distance between samples, for one that the scene states.
+    pub(crate) fn step(self, step_voxels: f64) -> f64 {
+        match self {
+            Quality::Final => step_voxels,
+            Quality::Draft => Quality::DRAFT_STEPS * step_voxels,
+        }
+    }
 }
 
 /// How the samples of a frame are made into a picture.
@@ -76,6 +102,7 @@ impl Scene {
             clip: None,
             skipping: Skipping::On,
             technique: Technique::RayCasting,
+            quality: Quality::Final,
         }
     }
     /// The view for which bricks are selected. Without skipping, bricks outside the view are kept, too.

@@ -36,6 +36,7 @@ pub use plan_mutants::PlanMutant;
 pub use record::{Comparison, Difference, RecordEntry, RecordError, RecordWriter, read_record};
 pub use rule::{Complaint, PlanTolerance, Tolerance, Verdict};
 pub use run::Run;
+pub(crate) use samples::{Samples, VolumeSamples};
 pub use self_check::SelfCheck;
 pub use shader_mutants::ShaderMutant;
 pub use storage::Storage;

@@ -1,6 +1,6 @@
 //! The volumes that are rendered, from where, by which geometry.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use brickfield::bricks::{BrickTree, BuildOptions, Downsampling, build_tree};
 use brickfield::frame::{Backend, Division, Placement, Target};

@@ -4,6 +4,7 @@ use brickfield::bricks::Downsampling;
 use brickfield::frame::{Placement, Target};
 use brickfield::lod::Criterion;
 use brickfield::{Residency, Technique, prepare};
+use brickfield_core::glam::UVec2;
 use brickfield_core::{BrickSide, Image};
 
 use super::LamarArgs;

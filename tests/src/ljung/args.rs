@@ -87,3 +87,19 @@ impl LjungArgs {
         all.filter(|part| self.part.is_empty() || self.part.contains(part)).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_come_once_in_their_order() {
+        let parse = |words: &str| LjungArgs::try_parse_from(words.split_whitespace());
+        let of_the_paper = parse("compare --paper ljung").unwrap();
+        assert_eq!((of_the_paper.parts().len(), of_the_paper.seeds), (Part::value_variants().len(), 100));
+        assert_eq!((of_the_paper.blocks, of_the_paper.ratios), (BlockSide::V16, vec![8.0, 32.0, 143.0]));
+        let some = parse("compare --paper ljung --part cost,gradient,cost --blocks 8").unwrap();
+        assert_eq!((some.parts(), some.blocks), (vec![Part::Gradient, Part::Cost], BlockSide::V8));
+        assert!(parse("compare --paper ljung --blocks 12").is_err());
+    }
+}

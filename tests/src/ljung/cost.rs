@@ -33,7 +33,7 @@ pub(super) fn run(args: &LjungArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
                     let mode_name = if mode == Mode::Exact { "exact" } else { "fast" };
                     let name = backend.describe().backend;
                     let claim = format!("{}, {what}, {mode_name}, {name}: maximum distance / nearest", data_set.name);
-                    let claim = Claim::of_ratio(claim, ratio, Bound::Below(aim));
+                    let claim = Claim::of_ratio(claim, ratio, Bound::AtMost(aim));
                     print(&claim.to_string())?;
                     claims.push(claim);
                 }

@@ -85,7 +85,7 @@ fn figure_5(args: &LjungArgs, rivals: &mut Rivals) -> Result<Vec<String>, PaperE
         // Blocks 1 to 4 of the figure; the volume is one voxel thick, so that all others are missing.
         let panel = |b: usize| {
             let grey = |w: &[f64; 8]| [(w[b] + w[b + 4]) as f32; 3];
-            let pixels = last.weights.iter().map(|w| grey(w)).map(|[r, g, b]| [r, g, b, 1.0]).collect();
+            let pixels = last.weights.iter().map(grey).map(|[r, g, b]| [r, g, b, 1.0]).collect();
             Image::new(UVec2::splat(PANEL), pixels).expect("a pixel for each position")
         };
         rows.push(beside(&[panel(0), panel(1), panel(2), panel(3)]));

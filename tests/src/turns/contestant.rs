@@ -19,7 +19,7 @@ pub struct Contestant<'a> {
 
 /// What a contestant draws, and what of it is resident.
 enum Subject<'a> {
-    Tree(&'a BrickTree, Residency),
+    Tree(&'a BrickTree, Box<Residency>),
     Blocks(&'a dyn BlockSource, Vec<Level>, BlockStyle, BlockResidency),
 }
 
@@ -51,7 +51,7 @@ pub enum FrameError {
 impl<'a> Contestant<'a> {
     /// A scene whose bricks no backend has yet.
     pub fn new(tree: &'a BrickTree, scene: Scene) -> Contestant<'a> {
-        Contestant { subject: Subject::Tree(tree, Residency::default()), scene }
+        Contestant { subject: Subject::Tree(tree, Box::default()), scene }
     }
 
     /// A scene of flat blocks at some levels, of which no backend has any yet.

@@ -1,7 +1,7 @@
 //! Where the samples of flat blocks lie.
 
 use brickfield_core::glam::UVec3;
-use brickfield_core::{BlockLayout, Level, Place};
+use brickfield_core::{BlockLayout, Interblock, Level, Place};
 
 use super::SlotsError;
 use super::slots::check_inside;
@@ -34,8 +34,10 @@ pub enum BlockSamples {
 
 /// Bits of a texel's coordinates in a row: x, y, z.
 const TEXEL_BITS: [u32; 3] = [11, 11, 10];
-/// In a row's first word: the level is below it.
-const ONE_SAMPLE: u32 = 1 << 8;
+/// Bits of a level in a row.
+const LEVEL_BITS: u32 = 3;
+/// In a row's first word: the block is one sample.
+const ONE_SAMPLE: u32 = 1 << 31;
 
 impl BlockPlaces {
     /// The blocks of a layout, by number, in a texture of so many texels.
@@ -92,17 +94,51 @@ impl BlockPlaces {
         self.layout.dims().to_array().into_iter().any(|n| n % side != 0)
     }
 
-    /// The rows as shaders read them, two words each: the level, and whether the block is one sample; and its first texel
-    /// ([`TEXEL_BITS`] from the lowest), or the sample.
-    pub(super) fn packed(&self) -> Vec<[u32; 2]> {
-        let pack = |row: &BlockRow| {
-            let level = u32::from(row.level.0);
+    /// The level of all blocks, if they have one and lie in the texture as in the volume: then they are one array of samples, and
+    /// values between blocks are between neighbouring texels.
+    ///
+    /// Not so where a block at an upper end has fewer voxels than a sample averages, and the scheme is not
+    /// [`Interblock::MaximumDistance`]: the others are linear only between samples that are as far from the face.
+    pub(super) fn dense_level(&self, scheme: Interblock) -> Option<Level> {
+        let level = self.rows.first()?.level;
+        let (side, end) = (self.layout.side().n_voxels() >> level.0, self.layout.n_blocks() - 1);
+        let is_short = self.layout.extent(end).cmplt(UVec3::splat(level.stride())) & end.cmpgt(UVec3::ZERO);
+        if is_short.any() && scheme != Interblock::MaximumDistance {
+            return None;
+        }
+        let is_natural =
+            |(block, row): (UVec3, &BlockRow)| row.level == level && row.samples == BlockSamples::Texture(block * side);
+        self.layout.blocks().zip(&self.rows).all(is_natural).then_some(level)
+    }
+
+    /// The rows as shaders read them, four words each.
+    ///
+    /// The first three have the levels of the block and its 26 neighbours, one word for each layer of nine along z, x fastest, three
+    /// bits each from the lowest; a neighbour that is missing has the block's own. The last word is its first texel
+    /// ([`TEXEL_BITS`] from the lowest), or the sample, if the first word says that it is one.
+    pub(super) fn packed(&self) -> Vec<[u32; 4]> {
+        let pack = |(block, row): (UVec3, &BlockRow)| {
+            let [a, b, c] = self.levels_around(block);
             match row.samples {
-                BlockSamples::One(read) => [level | ONE_SAMPLE, read.to_bits()],
-                BlockSamples::Texture(texel) => [level, packed_texel(texel)],
+                BlockSamples::One(read) => [a | ONE_SAMPLE, b, c, read.to_bits()],
+                BlockSamples::Texture(texel) => [a, b, c, packed_texel(texel)],
             }
         };
-        self.rows.iter().map(pack).collect()
+        self.layout.blocks().zip(&self.rows).map(pack).collect()
+    }
+
+    fn levels_around(&self, block: UVec3) -> [u32; 3] {
+        let last = self.layout.n_blocks() - 1;
+        let level = |offset: UVec3| {
+            // One more, so that the one before the first is not negative.
+            let at = block + offset;
+            let is_there = at.cmpge(UVec3::ONE).all() && at.cmple(last + 1).all();
+            u32::from(self.row(if is_there { at - 1 } else { block }).level.0)
+        };
+        [0, 1, 2].map(|z| {
+            let layer = (0..9).map(|i| level(UVec3::new(i % 3, i / 3, z)) << (LEVEL_BITS * i));
+            layer.fold(0, |word, level| word | level)
+        })
     }
 
     /// Whether all rows are of the layout's blocks, and in the texture.
@@ -118,7 +154,7 @@ impl BlockPlaces {
         for (slot, row) in self.rows.iter().enumerate() {
             let place = self.place(self.layout.block(slot));
             let (n_samples, is_in_row) = (place.n_samples(), matches!(row.samples, BlockSamples::One(_)));
-            if row.level > self.layout.side().one_sample() || is_in_row != (n_samples == 1) {
+            if row.level > self.layout.side().one_sample() || (is_in_row && n_samples > 1) {
                 return Err(SlotsError::OneSample { slot, level: row.level, is_in_row, n_samples });
             }
             if !is_in_row {

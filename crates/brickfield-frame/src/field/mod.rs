@@ -205,6 +205,15 @@ impl Field {
         levels.next().is_some_and(|first| levels.any(|level| level != first))
     }
 
+    /// The level of a field that is one array of samples: flat blocks that are blended, all of one level and in the texture as in
+    /// the volume.
+    pub fn dense_level(&self) -> Option<Level> {
+        match (self.slots.places(), self.join) {
+            (Places::Blocks(places), Join::Blend(scheme)) => places.dense_level(scheme),
+            _ => None,
+        }
+    }
+
     /// Whether flat blocks at the volume's upper ends have a smaller extent.
     pub fn has_short_blocks(&self) -> bool {
         match self.slots.places() {

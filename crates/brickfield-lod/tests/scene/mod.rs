@@ -1,4 +1,5 @@
 //! Random layouts, grids, cameras and criteria.
+#![allow(dead_code, reason = "each test file takes what it needs")]
 
 use brickfield_core::glam::{DMat3, DVec3, UVec2, UVec3};
 use brickfield_core::{BrickLayout, BrickSide, Camera, Grid, IndexPos, Level, Projection, WorldPos};

@@ -1,12 +1,13 @@
 //! The options that the `brickfield` command shares with the conformance runs.
 
+mod blocks;
 pub mod values;
 
 use std::path::{Path, PathBuf};
 
 use brickfield_bricks::{BrickTree, BuildOptions, Downsampling, build_tree_observed};
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
-use brickfield_core::{Aabb, BrickSide, Grid, Level, LinearRgb, TransferFunction, Volume};
+use brickfield_core::{Aabb, BlockSide, BrickSide, Grid, Level, LinearRgb, TransferFunction, Volume};
 use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
 use brickfield_io::{ChoiceKind, Limits, OpenError, OpenOptions, Opened, RawSpec, SliceSource, WorldFrame};
 use brickfield_lod::Criterion;
@@ -14,7 +15,9 @@ use brickfield_optics::{NarrowPeak, Preset, QuadratureRule, narrow_peak};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::{Scene, Skipping, Technique, Viewpoint};
+pub use blocks::{BlockArgs, BlockSubject};
+
+use crate::{Quality, Scene, Skipping, Technique, Viewpoint};
 
 /// How a file is read.
 #[derive(Args, Clone, Debug)]
@@ -160,6 +163,9 @@ pub struct SamplingOptions {
     /// their samples
     #[arg(long, value_name = "TARGET", value_parser = values::target)]
     pub polygons: Option<Target>,
+    /// final, or draft (steps of twice the length, and of flat blocks the nearest one alone): while the camera moves
+    #[arg(long, value_name = "WHICH", default_value = "final", value_parser = values::quality)]
+    pub quality: Quality,
     /// Upload and sample transparent bricks too (to measure what leaving them out saves)
     #[arg(long)]
     pub no_skip: bool,
@@ -187,6 +193,14 @@ pub enum OptionError {
     Open(#[from] brickfield_io::OpenError),
     #[error(transparent)]
     Build(#[from] brickfield_bricks::BuildError),
+    #[error(transparent)]
+    Blocks(#[from] brickfield_bricks::BlockBuildError),
+    #[error(transparent)]
+    BlockErrors(#[from] brickfield_lod::EstimateError),
+    #[error("the blocks' budget: {0}")]
+    Budget(#[from] brickfield_lod::BudgetError),
+    #[error("--block-level {level}: blocks of {side} voxels have levels 0 to {most}")]
+    BlockLevel { level: u8, side: BlockSide, most: u8 },
     #[error("--transfer: {0}")]
     Preset(#[from] brickfield_core::TransferError),
     #[error("--transfer: {0}")]
@@ -206,7 +220,10 @@ impl OptionError {
     pub fn is_usage(&self) -> bool {
         match self {
             OptionError::Open(_) | OptionError::Build(_) | OptionError::Preset(_) | OptionError::Transfer(_) => false,
-            OptionError::NoSuchTransfer { .. }
+            OptionError::Blocks(_) | OptionError::BlockErrors(_) => false,
+            OptionError::Budget(_)
+            | OptionError::BlockLevel { .. }
+            | OptionError::NoSuchTransfer { .. }
             | OptionError::Camera(_)
             | OptionError::ClipOutside { .. }
             | OptionError::Exclude { .. } => true,
@@ -343,23 +360,30 @@ impl ViewOptions {
     /// # Errors
     /// What the camera refuses, or a clip box outside of the volume.
     pub fn scene(&self, subject: &Subject) -> Result<Scene, OptionError> {
-        let (grid, layout) = (subject.tree.grid(), subject.tree.layout());
-        let camera = self.camera.camera(grid, subject.frame, self.size)?;
-        note_missing_levels(&self.lod, layout.root().level);
+        note_missing_levels(&self.lod, subject.tree.layout().root().level);
+        self.scene_of(subject.tree.grid(), subject.frame, &subject.transfer)
+    }
+
+    /// The scene of whatever lies on a grid, sampled as by default.
+    ///
+    /// # Errors
+    /// As [`scene`](Self::scene).
+    pub fn scene_of(&self, grid: &Grid, frame: WorldFrame, transfer: &TransferFunction) -> Result<Scene, OptionError> {
+        let camera = self.camera.camera(grid, frame, self.size)?;
         if let Some(clip) = self.clip {
             check_clip(clip, grid)?;
         }
-        let scene = Scene::new(camera, self.size, subject.transfer.clone());
+        let scene = Scene::new(camera, self.size, transfer.clone());
         Ok(Scene { detail: self.lod.clone(), clip: self.clip, ..scene })
     }
 }
 
 impl SamplingOptions {
-    /// The scene of a volume, sampled as asked for.
+    /// The scene of a volume, sampled as asked for. The default rule depends on the volume, if it is in memory.
     ///
     /// # Errors
     /// Options that exclude each other.
-    pub fn of(&self, scene: Scene, volume: &Volume) -> Result<Scene, OptionError> {
+    pub fn of(&self, scene: Scene, volume: Option<&Volume>) -> Result<Scene, OptionError> {
         self.check()?;
         let rule = self.rule.unwrap_or_else(|| self.default_rule(&scene, volume));
         let tessellated = Placement::TessellatedShells { facet_pixels: values::FACET_PIXELS };
@@ -376,15 +400,16 @@ impl SamplingOptions {
             division: self.divide.unwrap_or(division),
             lengths: self.lengths,
             technique,
+            quality: self.quality,
             skipping: if self.no_skip { Skipping::Off } else { Skipping::On },
             ..scene
         })
     }
 
     /// The midpoint rule, unless it steps over a peak of the transfer function: then pre-integration, and that is said.
-    fn default_rule(&self, scene: &Scene, volume: &Volume) -> QuadratureRule {
+    fn default_rule(&self, scene: &Scene, volume: Option<&Volume>) -> QuadratureRule {
         let narrow = match self.lengths {
-            Lengths::True => narrow_peak(volume, &scene.transfer, self.step),
+            Lengths::True => volume.and_then(|volume| narrow_peak(volume, &scene.transfer, self.step)),
             // Only the midpoint rule has nominal lengths.
             Lengths::Nominal => None,
         };

@@ -3,14 +3,14 @@
 
 use brickfield_bricks::Downsampling;
 use brickfield_core::glam::{DVec3, UVec2};
-use brickfield_core::{Aabb, BrickSide, Level, ScalarType, WorldPos};
-use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
+use brickfield_core::{Aabb, BlockSide, BrickSide, Interblock, Level, ScalarType, WorldPos};
+use brickfield_frame::{Division, Join, Lengths, Mode, Placement, Target};
 use brickfield_io::{ByteOrder, RawSpec};
 use brickfield_lod::Criterion;
 use brickfield_optics::QuadratureRule;
 
 use super::{Background, Boxes};
-use crate::MAX_IMAGE;
+use crate::{MAX_IMAGE, Quality, TransparentBlocks};
 
 /// Pixels along a facet of tessellated shells where none are asked for.
 pub const FACET_PIXELS: u32 = 16;
@@ -63,6 +63,37 @@ pub fn size(text: &str) -> Result<UVec2, String> {
 pub fn brick_side(text: &str) -> Result<BrickSide, String> {
     let n = text.parse().map_err(|_| "a number: 16, 32 or 64".to_owned())?;
     BrickSide::new(n).map_err(|e| e.to_string())
+}
+
+/// Voxels along a block's side.
+pub fn block_side(text: &str) -> Result<BlockSide, String> {
+    let n = text.parse().map_err(|_| "a number: 8, 16 or 32".to_owned())?;
+    BlockSide::new(n).map_err(|e| e.to_string())
+}
+
+/// How values between flat blocks come about.
+pub fn join(text: &str) -> Result<Join, String> {
+    let scheme = || Interblock::ALL.into_iter().find(|scheme| scheme.name() == text).map(Join::Blend);
+    let names = Interblock::ALL.map(Interblock::name).join(", ");
+    (text == "nearest").then_some(Join::Shared).or_else(scheme).ok_or_else(|| format!("one of nearest, {names}"))
+}
+
+/// Draft or final.
+pub fn quality(text: &str) -> Result<Quality, String> {
+    match text {
+        "final" => Ok(Quality::Final),
+        "draft" => Ok(Quality::Draft),
+        _ => Err("final or draft".to_owned()),
+    }
+}
+
+/// What is drawn inside transparent blocks.
+pub fn transparent_blocks(text: &str) -> Result<TransparentBlocks, String> {
+    match text {
+        "empty" => Ok(TransparentBlocks::Empty),
+        "blended" => Ok(TransparentBlocks::Blended),
+        _ => Err("empty or blended".to_owned()),
+    }
 }
 
 /// How coarser levels come about.

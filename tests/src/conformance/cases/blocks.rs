@@ -80,10 +80,17 @@ fn pictures() -> Vec<Case> {
                 s.technique = Technique::Polygons(Target::Float32);
             })
         }),
+        picture("blocks/all-of-level-2", catches![shader::NEAREST, DecodeOffset], move || {
+            Setup::new(hills(&grid(), u16), soft(u16)).blocks(
+                BlockSide::V8,
+                BlockLevels::All(Level(2)),
+                blended(MaximumDistance),
+            )
+        }),
         picture("blocks/fast", catches![shader::HALF_TEXEL, shader::MAXIMUM_TO_THE_FACE], move || {
             random(u16, BlockSide::V8, blended(MaximumDistance)).with(|s| s.mode = Mode::FAST)
         }),
-        picture("blocks/skipping", catches![shader::BLOCKS_SWAPPED, VisibleTooSmall, IndexSwapped], move || {
+        picture("blocks/skipping", catches![shader::BLOCKS_SWAPPED, shader::ONE_SAMPLE_FORGOTTEN], move || {
             let knots = [knot(0.3, 0.0, WARM), knot(0.9, 0.5, COOL)];
             let transfer = spread(&knots, u8).expect("knots ascend");
             let grid = Grid::axis_aligned(UVec3::new(71, 66, 53), DVec3::ONE).expect("a grid");
@@ -96,7 +103,7 @@ fn pictures() -> Vec<Case> {
 fn equal() -> Vec<Case> {
     let case = |scheme: Interblock, side, scalar| {
         let name = format!("blocks/equal-{}", scheme.name());
-        picture(name, catches![shader::NEAREST, shader::LERP_SWAPPED, shader::BLOCKS_SWAPPED], move || {
+        picture(name, catches![shader::NEAREST, shader::LERP_SWAPPED, DecodeOffset], move || {
             Setup::new(hills(&grid(), scalar), soft(scalar)).blocks(side, BlockLevels::All(Level(0)), blended(scheme))
         })
     };

@@ -11,7 +11,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use brickfield::io::SAVED_EXTENSIONS;
-use brickfield::options::{Boxes, InputOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions, values};
+use brickfield::options::{
+    BlockArgs, Boxes, InputOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions, values,
+};
 use brickfield::overlay::LEVEL_COLORS;
 use brickfield::{AdapterInfo, BackendError, BackendKind, BackendStatus, Validation, backends};
 use clap::{Args, Parser, Subcommand};
@@ -131,8 +133,10 @@ struct RenderArgs {
     view: ViewOptions,
     #[command(flatten)]
     sampling: SamplingOptions,
+    #[command(flatten)]
+    flat: BlockArgs,
     #[arg(long, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "drawn",
-          value_parser = values::boxes, help = show_bricks_help())]
+          conflicts_with = "blocks", value_parser = values::boxes, help = show_bricks_help())]
     show_bricks: Option<Boxes>,
 }
 

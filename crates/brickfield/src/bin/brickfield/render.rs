@@ -2,13 +2,15 @@
 
 use std::collections::HashSet;
 
-use brickfield::core::{BrickId, Image, Level};
+use brickfield::bricks::block_memory;
+use brickfield::core::{BlockSide, BrickId, Image, Level};
 use brickfield::frame::{Backend, Frame, FramePlan};
-use brickfield::lod::select_cut;
-use brickfield::options::{Boxes, Subject, values};
+use brickfield::lod::{BlockLevels, select_cut};
+use brickfield::options::{BlockSubject, Boxes, Subject, values};
 use brickfield::overlay::{LevelColor, show_bricks, show_bricks_faintly};
 use brickfield::{
-    BackendError, BackendKind, Residency, Scene, Technique, check_picture_path, open_backend, prepare, write_picture,
+    BackendError, BackendKind, BlockResidency, Residency, Scene, Technique, check_picture_path, open_backend, prepare,
+    prepare_blocks, write_picture,
 };
 
 use crate::{Failure, RenderArgs, print};
@@ -19,15 +21,14 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     args.view.check()?;
     args.sampling.check()?;
     let mut backend = open(args)?;
+    if let Some(side) = args.flat.blocks {
+        return render_blocks(args, side, backend.as_mut());
+    }
     let subject = Subject::open(&args.file, &args.input, &args.tree, &args.view)?;
-    let scene = args.sampling.of(args.view.scene(&subject)?, &subject.volume)?;
+    let scene = args.sampling.of(args.view.scene(&subject)?, Some(&subject.volume))?;
     let mut residency = Residency::default();
     let plan = prepare(&subject.tree, &scene, &mut residency).map_err(Failure::usage)?;
-    if plan.visible().is_empty() {
-        eprintln!(
-            "note: nothing is visible: the transfer function is 0 over all values inside the clip box and the view"
-        );
-    }
+    note_if_nothing_shows(&plan);
     let mut frame = backend.render(&plan)?;
     let shown = args.show_bricks.map(|boxes| ShownBricks::new(boxes, &subject, &scene, residency.bricks()));
     if let Some(shown) = &shown {
@@ -40,6 +41,61 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         print(&shown.legend())?;
     }
     check_validation(&backend.validation_messages())
+}
+
+/// Renders flat blocks.
+fn render_blocks(args: &RenderArgs, side: BlockSide, backend: &mut dyn Backend) -> Result<(), Failure> {
+    let subject = BlockSubject::open(&args.file, &args.input, side, &args.view)?;
+    let grid = subject.source.grid();
+    let scene = args.view.scene_of(grid, subject.frame, &subject.transfer)?;
+    let scene = args.sampling.of(scene, subject.volume.as_deref())?;
+    let selection = args.flat.select(&subject, &scene)?;
+    let (levels, mut residency) = (&selection.levels, BlockResidency::default());
+    let plan = prepare_blocks(subject.source.as_ref(), &scene, levels.levels(), args.flat.style(), &mut residency)?;
+    note_if_nothing_shows(&plan);
+    let frame = backend.render(&plan)?;
+    let attributes = attributes(args, backend, &scene, &plan);
+    write_picture(&args.out, &frame.image, args.view.background.0, &attributes)?;
+    print(&summary(backend, &scene, &plan, &frame))?;
+    print(&block_summary(&subject, levels, &residency, &plan))?;
+    check_validation(&backend.validation_messages())
+}
+
+/// The blocks of each level, and their bytes.
+fn block_summary(subject: &BlockSubject, levels: &BlockLevels, residency: &BlockResidency, plan: &FramePlan) -> String {
+    let layout = subject.source.layout();
+    let memory = block_memory(layout, subject.source.scalar_type(), levels.levels());
+    let by_level: Vec<String> = layout
+        .side()
+        .levels()
+        .zip(levels.n_blocks_per_level())
+        .filter(|(_, n)| *n > 0)
+        .map(|(level, n)| format!("{n} of level {}", level.0))
+        .collect();
+    let slots = plan.field().slots();
+    let free = residency.n_free_texels() * slots.format().n_bytes() as u64;
+    format!(
+        "flat blocks of {}: {}; {:.1}:1\nkept {:.1} MiB, {:.1} MiB of the texture free; with ghost layers {:.1} MiB (one side), {:.1} MiB (both)\n",
+        layout.side(),
+        by_level.join(", "),
+        memory.ratio(),
+        mib(slots.n_bytes() as u64),
+        mib(free),
+        mib(memory.larger.single_sided_bytes),
+        mib(memory.larger.double_sided_bytes),
+    )
+}
+
+fn mib(bytes: u64) -> f64 {
+    bytes as f64 / f64::from(1 << 20)
+}
+
+fn note_if_nothing_shows(plan: &FramePlan) {
+    if plan.visible().is_empty() {
+        eprintln!(
+            "note: nothing is visible: the transfer function is 0 over all values inside the clip box and the view"
+        );
+    }
 }
 
 fn check_validation(messages: &[String]) -> Result<(), Failure> {

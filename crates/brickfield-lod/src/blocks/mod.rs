@@ -1,0 +1,21 @@
+//! A level for every flat block: what a block's levels cost in visible error, and how a byte budget is spent on them.
+
+mod change;
+mod errors;
+mod estimate;
+mod exact;
+mod levels;
+mod rank;
+mod slab;
+mod spend;
+mod table;
+mod weights;
+
+pub use change::changed_values;
+pub use errors::{BlockErrors, EstimateError, LevelErrors, N_LEVELS};
+pub use exact::{Reconstruction, exact_errors};
+pub use levels::{BlockLevels, BlockLevelsError};
+pub use rank::rank_correlation;
+pub use slab::{Slab, SlabError};
+pub use spend::{BlockBudget, BlockSelection, BudgetError, BudgetSize, OneSampleBlocks, select_block_levels};
+pub use weights::{BlockView, Importance, block_weights};
