@@ -105,6 +105,11 @@ impl Volume {
         &self.voxels
     }
 
+    /// The voxels alone.
+    pub fn into_voxels(self) -> Voxels {
+        self.voxels
+    }
+
     /// The map from stored voxels to values.
     pub fn rescale(&self) -> Rescale {
         self.rescale

@@ -5,10 +5,14 @@ mod block_residency;
 mod blocks;
 mod course;
 mod encode;
+#[cfg(feature = "formats")]
+mod pack;
 mod picture;
 mod prepare;
 mod residency;
 mod scene;
+#[cfg(feature = "formats")]
+mod store;
 mod viewpoint;
 mod visibility;
 
@@ -28,8 +32,12 @@ pub use brickfield_interp as interp;
 pub use brickfield_io as io;
 pub use brickfield_lod as lod;
 pub use brickfield_optics as optics;
+#[cfg(feature = "formats")]
+pub use pack::{PackError, PackProgress, Packed, pack};
 pub use picture::{PictureError, PictureFormat, check_picture_path, srgb8, write_exr, write_picture, write_png};
 pub use prepare::{MAX_FACETS, MAX_IMAGE, MAX_POLYGONS, MAX_SEGMENTS, PrepareError, prepare, prepare_selection};
 pub use residency::{Copied, Residency};
 pub use scene::{Quality, Scene, Skipping, Technique};
+#[cfg(feature = "formats")]
+pub use store::{StoreBlocks, StoreLimits, SummaryProgress};
 pub use viewpoint::{Viewpoint, ViewpointError};

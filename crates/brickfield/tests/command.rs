@@ -68,6 +68,31 @@ fn scripts_read_json() {
 }
 
 #[test]
+#[cfg(feature = "formats")]
+fn pack_makes_a_store_that_is_read_like_the_file() {
+    let place = WorkFolder::new();
+    let out = place.run("pack|a.nrrd|-o|a.zarr");
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    assert_eq!(text(&out.stdout), "a.zarr: 12 x 10 x 8 voxels of u8, levels 0 to 4\n");
+    let [a, b] =
+        ["a.nrrd", "a.zarr"].map(|name| open(&place.path().join(name), &OpenOptions::default()).unwrap().volume);
+    assert_eq!(a.voxels(), b.voxels());
+    // Once more it is refused, before any work, and with what is wrong of the file nothing is left.
+    let again = place.run("pack|a.nrrd|-o|a.zarr");
+    assert_eq!(again.status.code(), Some(2));
+    assert!(text(&again.stderr).contains("a.zarr: there is one already"), "{}", text(&again.stderr));
+    std::fs::write(place.path().join("short.raw"), [0; 10]).unwrap();
+    let short = place.run("pack|short.raw|--raw|4x4x4,u8|-o|b.zarr");
+    assert_eq!(short.status.code(), Some(1));
+    assert!(
+        text(&short.stderr).contains("short.raw: the file holds 10 bytes; 64 are promised"),
+        "{}",
+        text(&short.stderr)
+    );
+    assert!(!place.path().join("b.zarr").exists());
+}
+
+#[test]
 fn rescaled_integers_take_the_bytes_of_integers() {
     let place = WorkFolder::new();
     let plain = open(&place.path().join("a.nrrd"), &OpenOptions::default()).unwrap().volume;

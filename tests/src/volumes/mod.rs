@@ -10,7 +10,7 @@ mod shape;
 
 pub use enlarge::enlarge;
 pub use field::FieldFormula;
-pub use phantom::{PHANTOM_DIMS, Phantom, phantom, phantom_camera, phantom_of, phantom_transfer};
+pub use phantom::{PHANTOM_DIMS, Phantom, PhantomSlices, phantom, phantom_camera, phantom_of, phantom_transfer};
 pub use shape::Shape;
 
 use brickfield_core::glam::{DVec3, UVec3};
@@ -63,6 +63,20 @@ pub fn spread(knots: &[Knot], scalar: ScalarType) -> Result<TransferFunction, Tr
     let range = unit_range(scalar);
     let moved = knots.iter().map(|k| Knot { value: range.min + k.value * (range.max - range.min), ..*k });
     TransferFunction::new(moved.collect())
+}
+
+/// No samples.
+fn empty(scalar: ScalarType) -> Voxels {
+    match scalar {
+        ScalarType::U8 => Voxels::U8(Vec::new()),
+        ScalarType::I8 => Voxels::I8(Vec::new()),
+        ScalarType::U16 => Voxels::U16(Vec::new()),
+        ScalarType::I16 => Voxels::I16(Vec::new()),
+        ScalarType::U32 => Voxels::U32(Vec::new()),
+        ScalarType::I32 => Voxels::I32(Vec::new()),
+        ScalarType::F32 => Voxels::F32(Vec::new()),
+        ScalarType::F64 => Voxels::F64(Vec::new()),
+    }
 }
 
 fn samples<T: Scalar>(grid: &Grid, field: &(impl Fn(DVec3) -> f64 + Sync)) -> Voxels {

@@ -4,11 +4,14 @@
 //! cubic nor isotropic, so that swapped axes and mixed units show too; soft tissue, hard bone and sharp metal lie in and
 //! behind each other; the neck is opaque up to the volume's face; about 70 % is empty, so skipping matters.
 
-use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Camera, CameraError, Grid, Knot, Projection, ScalarType, TransferFunction, Volume};
+use brickfield::io::{Format, ReadError, SliceSource, VolumeFacts, WorldFrame};
+use brickfield_core::glam::{DMat3, DVec3, UVec3};
+use brickfield_core::{
+    Camera, CameraError, Grid, Knot, Projection, Rescale, ScalarType, TransferFunction, Volume, Voxels,
+};
 
 use super::field::coverage;
-use super::{Shape, fill_unit, spread};
+use super::{Shape, empty, fill_unit, spread};
 
 /// Voxels of the phantom along x, y, z.
 pub const PHANTOM_DIMS: UVec3 = UVec3::new(112, 128, 120);
@@ -39,6 +42,52 @@ pub fn phantom_of(dims: UVec3, scalar: ScalarType) -> Phantom {
     let transfer = phantom_transfer(scalar);
     let camera = phantom_camera(&grid).expect("the phantom's camera looks at its box");
     Phantom { volume, transfer, camera }
+}
+
+/// The slices of the phantom at any resolution: each is made when it is asked for, so that the volume is never whole in memory.
+pub struct PhantomSlices {
+    facts: VolumeFacts,
+    parts: Vec<Solid>,
+    n_made: u32,
+}
+
+impl PhantomSlices {
+    /// The slices of [`phantom_of`], sample by sample, up to a rounding of positions. A zero dimension counts as one.
+    pub fn new(dims: UVec3, scalar: ScalarType) -> PhantomSlices {
+        let dims = dims.max(UVec3::ONE);
+        let grid = Grid::axis_aligned(dims, EXTENT_MM / dims.as_dvec3()).expect("the phantom's box has an extent");
+        let facts = VolumeFacts {
+            grid,
+            scalar,
+            rescale: Rescale::IDENTITY,
+            format: Format::Raw,
+            frame: WorldFrame::Plain,
+            unit: Some("mm".to_owned()),
+            notes: Vec::new(),
+            choices: Vec::new(),
+        };
+        PhantomSlices { facts, parts: parts(), n_made: 0 }
+    }
+}
+
+impl SliceSource for PhantomSlices {
+    fn facts(&self) -> &VolumeFacts {
+        &self.facts
+    }
+
+    fn next_slices(&mut self, n: u32) -> Result<Voxels, ReadError> {
+        let VolumeFacts { grid, scalar, .. } = &self.facts;
+        let dims = grid.dims();
+        let n = n.min(dims.z - self.n_made);
+        if n == 0 {
+            return Ok(empty(*scalar));
+        }
+        let first = (DVec3::new(0.5, 0.5, 0.5 + f64::from(self.n_made))) * grid.spacing();
+        let slab = Grid::from_first_sample(dims.with_z(n), grid.spacing(), first, DMat3::IDENTITY);
+        let slab = slab.expect("a part of the phantom's box has an extent");
+        self.n_made += n;
+        Ok(fill_unit(&slab, *scalar, |p| value(&self.parts, p - 0.5 * EXTENT_MM)).into_voxels())
+    }
 }
 
 /// Extinction per millimetre and colour of the phantom's tissues.
@@ -193,6 +242,21 @@ mod tests {
         let empty = bytes.iter().filter(|v| !seen(**v)).count() as f64 / bytes.len() as f64;
         assert!((0.6..0.8).contains(&empty), "{empty}");
         assert_eq!((volume.range().min, volume.range().max), (0.0, 255.0));
+    }
+
+    #[test]
+    fn slices_are_those_of_the_whole() {
+        let dims = UVec3::new(30, 34, 37);
+        let whole = phantom_of(dims, ScalarType::U8).volume;
+        let mut slices = PhantomSlices::new(dims, ScalarType::U8);
+        assert_eq!(slices.facts().grid.index_to_world(), whole.grid().index_to_world());
+        let mut all = Vec::new();
+        while let Voxels::U8(more) = slices.next_slices(16).unwrap()
+            && !more.is_empty()
+        {
+            all.extend(more);
+        }
+        assert!(all.len() == whole.voxels().len() && all.iter().zip(bytes(&whole)).all(|(a, b)| a.abs_diff(*b) <= 1));
     }
 
     #[test]

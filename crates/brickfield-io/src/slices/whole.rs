@@ -17,7 +17,7 @@ impl WholeSlices {
         let (grid, scalar, rescale) = (*volume.grid(), volume.scalar_type(), volume.rescale());
         notes.push(Note::ReadWhole { n_bytes: (volume.voxels().len() * scalar.n_bytes()) as u64 });
         let facts = VolumeFacts { grid, scalar, rescale, format, frame, unit, notes, choices };
-        WholeSlices { facts, voxels: volume.voxels().clone(), n_read: 0 }
+        WholeSlices { facts, voxels: volume.into_voxels(), n_read: 0 }
     }
 }
 

@@ -204,6 +204,20 @@ fn summaries_come_back() {
 }
 
 #[test]
+fn metadata_are_in_the_form_that_every_reader_takes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.zarr");
+    write(&path, &grid(DIMS), ScalarType::I16, 32, &options(Compression::Lossless));
+    for array in ["0", "3", "brickfield_blocks/16", "brickfield_blocks/32"] {
+        let json = fs::read(path.join(array).join("zarr.json")).unwrap();
+        let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+        // zarr-python refuses codecs by their bare names.
+        assert!(json["codecs"].as_array().unwrap().iter().all(serde_json::Value::is_object), "{array}");
+    }
+    assert!(!path.join("brickfield_blocks/8").join("zarr.json").exists());
+}
+
+#[test]
 fn no_more_is_read_than_the_box_needs_and_it_is_read_once() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.zarr");

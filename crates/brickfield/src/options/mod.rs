@@ -9,7 +9,7 @@ use brickfield_bricks::{BrickTree, BuildOptions, Downsampling, build_tree_observ
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BlockSide, BrickSide, Grid, Level, LinearRgb, TransferFunction, Volume};
 use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
-use brickfield_io::{ChoiceKind, Limits, OpenOptions, Opened, RawSpec, WorldFrame};
+use brickfield_io::{ChoiceKind, Limits, OpenError, OpenOptions, Opened, RawSpec, SliceSource, WorldFrame};
 use brickfield_lod::Criterion;
 use brickfield_optics::{NarrowPeak, Preset, QuadratureRule, narrow_peak};
 use clap::Args;
@@ -259,8 +259,19 @@ impl InputOptions {
         Ok((volume, frame, transfer))
     }
 
+    /// Opens the slices of a volume in order, so that it is never whole in memory if its format allows.
+    ///
+    /// # Errors
+    /// What the reader says.
+    pub fn open_slices(&self, path: &Path) -> Result<Box<dyn SliceSource>, OpenError> {
+        match &self.raw {
+            Some(raw) => brickfield_io::open_raw_slices(path, raw, &self.open_options()),
+            None => brickfield_io::open_slices(path, &self.open_options()),
+        }
+    }
+
     /// What is wanted of the file.
-    fn open_options(&self) -> OpenOptions {
+    pub fn open_options(&self) -> OpenOptions {
         let mut options = OpenOptions::from(self.limits());
         options.spacing = self.spacing;
         let EntryOptions { series, image, array, level, channel, time } = &self.entries;

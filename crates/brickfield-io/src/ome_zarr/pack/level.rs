@@ -19,6 +19,8 @@ const SHARD_SIDE: u32 = 512;
 
 pub(super) struct LevelWriter {
     array: Array<dyn WritableStorageTraits>,
+    key: String,
+    metadata: Value,
     dims: UVec3,
     shard: UVec3,
     /// Slices of a layer that is not full yet.
@@ -40,9 +42,11 @@ impl LevelWriter {
         let whole_chunks = |n: u32| n.div_ceil(CHUNK_SIDE) * CHUNK_SIDE;
         let shard = UVec3::new(whole_chunks(dims.x), whole_chunks(dims.y), CHUNK_SIDE);
         let shard = shard.min(UVec3::new(SHARD_SIDE, SHARD_SIDE, CHUNK_SIDE));
-        let metadata = serde_json::from_value(metadata(dims, shard, scalar, compression))?;
-        let array = Array::new_with_metadata(store.clone(), &format!("/{}", level.0), metadata)?;
-        Ok(LevelWriter { array, dims, shard, held: room_for(scalar, 0)?, n_written: 0 })
+        let metadata = metadata(dims, shard, scalar, compression);
+        let path = format!("/{}", level.0);
+        let array = Array::new_with_metadata(store.clone(), &path, serde_json::from_value(metadata.clone())?)?;
+        let key = format!("{}/zarr.json", level.0);
+        Ok(LevelWriter { array, key, metadata, dims, shard, held: room_for(scalar, 0)?, n_written: 0 })
     }
 
     pub(super) fn dims(&self) -> UVec3 {
@@ -120,8 +124,9 @@ impl LevelWriter {
         Ok(self.array.store_chunk_opt(&[z, y, x].map(u64::from), samples, &whole)?)
     }
 
-    pub(super) fn write_metadata(&self) -> Result<(), Fault> {
-        Ok(self.array.store_metadata()?)
+    /// The metadata, and their key. Those that `zarrs` writes have codecs by bare names, which not every reader takes.
+    pub(super) fn metadata(&self) -> (String, &Value) {
+        (self.key.clone(), &self.metadata)
     }
 }
 

@@ -195,10 +195,12 @@ impl PyramidWriter {
         let write = |key: &str, json: &Value| -> Result<(), Fault> {
             Ok(self.store.set(&StoreKey::new(key)?, serde_json::to_vec_pretty(json)?.into())?)
         };
-        self.levels.iter().try_for_each(LevelWriter::write_metadata)?;
-        let summaries: Vec<_> = self.summaries.iter().filter(|s| !s.is_empty()).collect();
+        let summaries: Vec<_> = self.summaries.iter().filter(|s| !s.is_empty()).map(SummaryWriter::metadata).collect();
+        let arrays = self.levels.iter().map(LevelWriter::metadata).chain(summaries.iter().cloned());
+        for (key, json) in arrays {
+            write(&key, json)?;
+        }
         if !summaries.is_empty() {
-            summaries.iter().try_for_each(|s| s.write_metadata())?;
             let group = json!({ "zarr_format": 3, "node_type": "group", "attributes": {} });
             write(&format!("{FOLDER}/zarr.json"), &group)?;
         }

@@ -17,6 +17,8 @@ pub(in super::super) const N_COLUMNS: usize = 4 + N_BLOCK_LEVELS + N_BLOCK_BINS;
 /// Layers of blocks, one after the other, each a chunk.
 pub(super) struct SummaryWriter {
     array: Array<dyn WritableStorageTraits>,
+    key: String,
+    metadata: Value,
     side: BlockSide,
     n_blocks: UVec3,
     n_layers: u32,
@@ -25,9 +27,11 @@ pub(super) struct SummaryWriter {
 impl SummaryWriter {
     pub(super) fn new(store: &WritableStorage, dims: UVec3, side: BlockSide) -> Result<SummaryWriter, Fault> {
         let n_blocks = BlockLayout::new(dims, side).n_blocks();
-        let metadata = serde_json::from_value(metadata(n_blocks))?;
-        let array = Array::new_with_metadata(store.clone(), &format!("/{FOLDER}/{side}"), metadata)?;
-        Ok(SummaryWriter { array, side, n_blocks, n_layers: 0 })
+        let metadata = metadata(n_blocks);
+        let path = format!("/{FOLDER}/{side}");
+        let array = Array::new_with_metadata(store.clone(), &path, serde_json::from_value(metadata.clone())?)?;
+        let key = format!("{FOLDER}/{side}/zarr.json");
+        Ok(SummaryWriter { array, key, metadata, side, n_blocks, n_layers: 0 })
     }
 
     pub(super) fn side(&self) -> BlockSide {
@@ -57,8 +61,9 @@ impl SummaryWriter {
         Ok(())
     }
 
-    pub(super) fn write_metadata(&self) -> Result<(), Fault> {
-        Ok(self.array.store_metadata()?)
+    /// The metadata, and their key. Those that `zarrs` writes have codecs by bare names, which not every reader takes.
+    pub(super) fn metadata(&self) -> (String, &Value) {
+        (self.key.clone(), &self.metadata)
     }
 }
 

@@ -2,6 +2,8 @@
 
 mod convert;
 mod info;
+#[cfg(feature = "formats")]
+mod pack;
 mod render;
 
 use std::io::{ErrorKind, Write};
@@ -27,6 +29,7 @@ use clap::{Args, Parser, Subcommand};
   brickfield info head.nrrd
   brickfield info scan.ome.tif --json
   brickfield convert dicom-folder/ -o head.nii.gz --series 1
+  brickfield pack large.nrrd -o large.zarr
   brickfield render head.nrrd -o head.png
   brickfield render dicom-folder/ -o head.exr --transfer ct-bone --camera \"front zoom=1.2\"
   brickfield render engine.vti -o inside.png --camera \"eye=80,100,60 target=200,128,60 up=0,0,1 fov=60\" --mode fast
@@ -49,6 +52,9 @@ enum Command {
     Render(Box<RenderArgs>),
     /// Saves a volume in another format: values, spacing and direction survive; what the format cannot state is noted
     Convert(ConvertArgs),
+    /// Packs a volume of any size as OME-Zarr 0.5 with all coarser levels, in bounded memory
+    #[cfg(feature = "formats")]
+    Pack(PackArgs),
     /// Lists the backends and their adapters, or why there are none
     Backends,
 }
@@ -71,6 +77,22 @@ struct ConvertArgs {
     #[arg(help = FILES_HELP)]
     file: PathBuf,
     #[arg(short, long, value_name = "VOLUME", help = convert_help())]
+    out: PathBuf,
+    /// Save samples as they are; otherwise they are compressed without loss
+    #[arg(long)]
+    unpacked: bool,
+    #[command(flatten)]
+    input: InputOptions,
+}
+
+#[cfg(feature = "formats")]
+#[derive(Args)]
+struct PackArgs {
+    #[arg(help = FILES_HELP)]
+    file: PathBuf,
+    /// OME-Zarr to write: a folder that is not there yet; until it is complete it has another name, so that an interrupted run leaves
+    /// no store
+    #[arg(short, long, value_name = "STORE")]
     out: PathBuf,
     /// Save samples as they are; otherwise they are compressed without loss
     #[arg(long)]
@@ -176,6 +198,8 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Info(args) => info::run(&args),
         Command::Convert(args) => convert::run(&args),
+        #[cfg(feature = "formats")]
+        Command::Pack(args) => pack::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Backends => print(&listed_backends()),
     };

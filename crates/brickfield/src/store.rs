@@ -1,0 +1,292 @@
+//! Flat blocks from a store on disk.
+
+use std::path::{Path, PathBuf};
+
+use brickfield_bricks::{BlockSource, FetchError, SourceId, average_box, block_summaries};
+use brickfield_core::glam::UVec3;
+use brickfield_core::{
+    BlockLayout, BlockSide, BlockSummary, Grid, Level, Rescale, Scalar, ScalarType, ValueRange, Voxels, with_voxels,
+};
+use brickfield_io::ome_zarr::ZarrLevels;
+use brickfield_io::{Limits, OpenError, OpenOptions, ReadError, VolumeFacts};
+
+use crate::pack::finite_for;
+
+/// How much memory a store may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StoreLimits {
+    /// Most bytes of unpacked chunks that are kept.
+    pub cache_bytes: u64,
+    /// Most bytes of the summaries of all blocks, and most bytes of one unpacked chunk.
+    pub max_bytes: u64,
+}
+
+impl Default for StoreLimits {
+    /// 64 MiB each.
+    fn default() -> StoreLimits {
+        StoreLimits { cache_bytes: 64 << 20, max_bytes: 64 << 20 }
+    }
+}
+
+/// The flat blocks of an OME-Zarr, of which only the chunks at the fetched resolutions are read.
+///
+/// A block of level l comes from the level of the store that halves every axis l times, else from the coarsest one that halves none more
+/// often: its samples are averaged, each weighted by the voxels that it covers. Levels are taken for averages, whatever their
+/// author did; samples of coarse levels are kept within the range of the block's voxels. In a store of [`pack`](crate::pack())
+/// all levels and summaries are those of [`build_blocks`](brickfield_bricks::build_blocks).
+///
+/// Memory: chunks and summaries within [`StoreLimits`]; for each thread that fetches, one chunk more, twice if it is compressed, and the block.
+pub struct StoreBlocks {
+    id: SourceId,
+    path: PathBuf,
+    layout: BlockLayout,
+    levels: ZarrLevels,
+    /// The store's level from which blocks of each level come.
+    from: Vec<usize>,
+    summaries: Vec<BlockSummary>,
+    range: ValueRange,
+    /// Whether coarse samples may leave the range of the voxels: those of others, and f64 by its rounding.
+    is_clamped: bool,
+    /// Least and greatest finite voxel, if there are voxels that are not finite.
+    finite: Option<ValueRange>,
+}
+
+/// How far the summaries of a store's blocks are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SummaryProgress {
+    /// Slices that are done.
+    pub n_done: u32,
+    /// Slices of the volume.
+    pub n_total: u32,
+}
+
+impl StoreBlocks {
+    /// Opens a store; of several images, channels and times `options` choose. The limits of `options` are not asked.
+    ///
+    /// A store that states no summaries is read once, 32 slices at a time, and twice if it has voxels that are not finite; `progress` is told.
+    ///
+    /// # Errors
+    /// What the reader says; chunks or summaries beyond the limits.
+    pub fn open(
+        path: &Path,
+        side: BlockSide,
+        limits: StoreLimits,
+        options: &OpenOptions,
+        progress: &mut dyn FnMut(SummaryProgress),
+    ) -> Result<StoreBlocks, OpenError> {
+        let mut options = options.clone();
+        options.limits = Limits { max_bytes: limits.max_bytes };
+        let levels = ZarrLevels::open(path, &options, limits.cache_bytes)?;
+        StoreBlocks::of_levels(path, levels, side, limits, progress)
+            .map_err(|fault| OpenError { path: path.to_owned(), fault })
+    }
+
+    fn of_levels(
+        path: &Path,
+        levels: ZarrLevels,
+        side: BlockSide,
+        limits: StoreLimits,
+        progress: &mut dyn FnMut(SummaryProgress),
+    ) -> Result<StoreBlocks, ReadError> {
+        let layout = BlockLayout::new(levels.facts().grid.dims(), side);
+        check_summaries(&layout, limits)?;
+        let stated = levels.block_summaries(side)?;
+        let is_clamped = stated.is_none() || levels.facts().scalar == ScalarType::F64;
+        let (summaries, finite) = match stated {
+            Some(summaries) => (summaries, None),
+            None => summarised(&levels, &layout, progress)?,
+        };
+        let ranges = summaries.iter().map(|summary| summary.range);
+        let range = ranges.reduce(ValueRange::union).unwrap_or(ValueRange { min: 0.0, max: 0.0 });
+        let from = side.levels().map(|level| finest_above(&levels, level)).collect();
+        let (id, path) = (SourceId::unique(), path.to_owned());
+        Ok(StoreBlocks { id, path, layout, levels, from, summaries, range, is_clamped, finite })
+    }
+
+    /// The store's folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// All about the volume but its samples.
+    pub fn facts(&self) -> &VolumeFacts {
+        self.levels.facts()
+    }
+
+    /// Bytes that were read of the store so far, summaries included.
+    pub fn n_bytes_read(&self) -> u64 {
+        self.levels.n_bytes_read()
+    }
+
+    /// Bytes of unpacked chunks that are kept.
+    pub fn n_bytes_kept(&self) -> u64 {
+        self.levels.n_bytes_kept()
+    }
+
+    /// Bytes of the summaries of all blocks.
+    pub fn n_summary_bytes(&self) -> u64 {
+        size_of_val(&self.summaries[..]) as u64
+    }
+
+    /// How often a chunk was asked for that another's store does not have: its voxels have the fill value. A chunk of a packed
+    /// store is an error.
+    pub fn n_missing_chunks(&self) -> u64 {
+        self.levels.n_missing_chunks()
+    }
+
+    /// The samples of a block, of a level of the store.
+    fn samples(&self, block: UVec3, level: Level) -> Result<Voxels, ReadError> {
+        let (first, extent) = (self.layout.first_voxel(block), self.layout.extent(block));
+        let from = self.from[usize::from(level.0)];
+        let shifts = self.levels.shifts(from).unwrap_or(UVec3::ZERO);
+        let n = ((extent - 1) >> shifts) + 1;
+        let samples = self.levels.box_voxels(from, first >> shifts, n)?;
+        let samples = match self.finite {
+            Some(range) => replaced(&samples, range),
+            None => samples,
+        };
+        if n == self.layout.n_samples(block, level) {
+            return Ok(samples);
+        }
+        Ok(average_box(&samples, extent, shifts, level).expect("a box has its samples"))
+    }
+
+    /// Whether the store's samples are those of the block, byte by byte.
+    fn is_as_stored(&self, block: UVec3, level: Level) -> bool {
+        let shifts = self.levels.shifts(self.from[usize::from(level.0)]).unwrap_or(UVec3::ZERO);
+        let n = ((self.layout.extent(block) - 1) >> shifts) + 1;
+        let is_in_range = level == Level(0) || !self.is_clamped;
+        n == self.layout.n_samples(block, level) && is_in_range && self.finite.is_none()
+    }
+}
+
+impl BlockSource for StoreBlocks {
+    fn id(&self) -> SourceId {
+        self.id
+    }
+
+    fn layout(&self) -> &BlockLayout {
+        &self.layout
+    }
+
+    fn grid(&self) -> &Grid {
+        &self.levels.facts().grid
+    }
+
+    fn scalar_type(&self) -> ScalarType {
+        self.levels.facts().scalar
+    }
+
+    fn rescale(&self) -> Rescale {
+        self.levels.facts().rescale
+    }
+
+    fn range(&self) -> ValueRange {
+        self.range
+    }
+
+    fn summaries(&self) -> &[BlockSummary] {
+        &self.summaries
+    }
+
+    fn fetch(&self, block: UVec3, level: Level, out: &mut Vec<u8>) -> Result<(), FetchError> {
+        FetchError::unless_exists(&self.layout, block, level)?;
+        let fault = |fault| FetchError::new(block, level, OpenError { path: self.path.clone(), fault });
+        if self.is_as_stored(block, level) {
+            let from = self.from[usize::from(level.0)];
+            let shifts = self.levels.shifts(from).unwrap_or(UVec3::ZERO);
+            let (first, n) = (self.layout.first_voxel(block) >> shifts, self.layout.n_samples(block, level));
+            return self.levels.read_box(from, first, n, out).map_err(fault);
+        }
+        let samples = self.samples(block, level).map_err(fault)?;
+        let range = self.summaries[self.layout.ordinal(block)].range;
+        write_le_bytes(&samples, range, out);
+        Ok(())
+    }
+}
+
+fn check_summaries(layout: &BlockLayout, limits: StoreLimits) -> Result<(), ReadError> {
+    let n_bytes = layout.n_blocks_total() as u128 * size_of::<BlockSummary>() as u128;
+    match n_bytes > u128::from(limits.max_bytes) {
+        true => Err(ReadError::TooLarge {
+            what: format!("summaries of {} blocks of {}^3 voxels", layout.n_blocks_total(), layout.side()),
+            n_bytes,
+            max_bytes: limits.max_bytes,
+        }),
+        false => Ok(()),
+    }
+}
+
+/// The coarsest level of a store that no axis of which is coarser than blocks of a level.
+fn finest_above(levels: &ZarrLevels, level: Level) -> usize {
+    let fits = |i: &usize| levels.shifts(*i).is_some_and(|s| s.cmple(UVec3::splat(level.0.into())).all());
+    let fitting = (0..levels.n_levels()).filter(fits);
+    fitting.max_by_key(|i| levels.shifts(*i).map(|s| s.element_sum())).unwrap_or(0)
+}
+
+/// Slices that are summarised at once: a layer of the largest blocks.
+const SLAB_SLICES: u32 = 32;
+
+/// The summaries of all blocks, from their voxels; and the range of the finite ones, if there are others.
+fn summarised(
+    levels: &ZarrLevels,
+    layout: &BlockLayout,
+    progress: &mut dyn FnMut(SummaryProgress),
+) -> Result<(Vec<BlockSummary>, Option<ValueRange>), ReadError> {
+    let dims = layout.dims();
+    let is_float = matches!(levels.facts().scalar, ScalarType::F32 | ScalarType::F64);
+    let finite = if is_float { finite_range(levels, dims)? } else { None };
+    let mut summaries = Vec::with_capacity(layout.n_blocks_total());
+    for z in (0..dims.z).step_by(SLAB_SLICES as usize) {
+        let extent = dims.with_z(SLAB_SLICES.min(dims.z - z));
+        let mut slab = levels.box_voxels(0, UVec3::new(0, 0, z), extent)?;
+        if let Some(range) = finite {
+            slab = replaced(&slab, range);
+        }
+        let of_slab = block_summaries(&slab, extent, layout.side(), levels.facts().rescale);
+        summaries.extend(of_slab.expect("a box has its samples"));
+        progress(SummaryProgress { n_done: z + extent.z, n_total: dims.z });
+    }
+    Ok((summaries, finite))
+}
+
+/// The range of the finite voxels; `None` if all are finite.
+fn finite_range(levels: &ZarrLevels, dims: UVec3) -> Result<Option<ValueRange>, ReadError> {
+    let (mut range, mut n_others) = (None::<ValueRange>, 0u64);
+    for z in (0..dims.z).step_by(SLAB_SLICES as usize) {
+        let extent = dims.with_z(SLAB_SLICES.min(dims.z - z));
+        let slab = levels.box_voxels(0, UVec3::new(0, 0, z), extent)?;
+        with_voxels!(&slab, v => for number in v.iter().map(|v| v.to_f64()) {
+            match number.is_finite() {
+                true => {
+                    let one = ValueRange { min: number, max: number };
+                    range = Some(range.map_or(one, |range| range.union(one)));
+                }
+                false => n_others += 1,
+            }
+        });
+    }
+    Ok((n_others > 0).then(|| range.unwrap_or(ValueRange { min: 0.0, max: 0.0 })))
+}
+
+/// The samples with finite ones in the place of others.
+fn replaced(samples: &Voxels, finite: ValueRange) -> Voxels {
+    fn of<T: Scalar>(samples: &[T], finite: ValueRange) -> Voxels {
+        let sample = |v: T| if v.to_f64().is_finite() { v } else { T::from_f64(finite_for(v.to_f64(), finite)) };
+        T::wrap(samples.iter().map(|v| sample(*v)).collect())
+    }
+    with_voxels!(samples, v => of(v, finite))
+}
+
+/// Replaces `out` by the samples, each kept within a range.
+fn write_le_bytes(samples: &Voxels, range: ValueRange, out: &mut Vec<u8>) {
+    fn kept<T: Scalar>(sample: T, range: ValueRange) -> T {
+        match sample.to_f64() {
+            number if range.contains(number) => sample,
+            number if number.is_nan() => T::from_f64(range.min),
+            number => T::from_f64(number.clamp(range.min, range.max)),
+        }
+    }
+    out.clear();
+    with_voxels!(samples, v => out.extend(v.iter().flat_map(|sample| kept(*sample, range).to_le_bytes())));
+}

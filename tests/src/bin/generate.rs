@@ -1,0 +1,40 @@
+//! Packs the phantom at any resolution as a store: slice by slice, never whole in memory.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Result;
+use brickfield::io::{Compression, SaveOptions};
+use brickfield::options::{progress_bar, values};
+use brickfield::{PackProgress, pack};
+use brickfield_conformance::volumes::PhantomSlices;
+use clap::Parser;
+
+/// Packs the phantom as OME-Zarr with all coarser levels; it is made slice by slice, so that a volume larger than memory can be had
+#[derive(Parser)]
+struct Arguments {
+    /// `NXxNYxNZ,TYPE` with TYPE u8 to f64, as `brickfield --raw` has it; the size in millimetres is always the same
+    #[arg(value_name = "SPEC", value_parser = values::raw_spec)]
+    volume: brickfield::io::RawSpec,
+    /// OME-Zarr to write: a folder that is not there yet
+    #[arg(short, long, value_name = "STORE")]
+    out: PathBuf,
+}
+
+fn main() -> Result<ExitCode> {
+    let Arguments { volume, out } = Arguments::parse();
+    let mut options = SaveOptions::default();
+    options.compression = Compression::Lossless;
+    let bar = progress_bar("packing the phantom");
+    let mut told = |p: PackProgress| {
+        bar.set_length(p.n_total);
+        bar.set_position(p.n_done);
+    };
+    let name = PathBuf::from("the phantom");
+    let mut slices = || Ok(Box::new(PhantomSlices::new(volume.dims, volume.scalar)) as _);
+    let packed = pack(&name, &mut slices, &out, &options, &mut told);
+    bar.finish_and_clear();
+    let packed = packed?;
+    println!("{}: {} voxels of {}, levels 0 to {}", out.display(), volume.dims, packed.scalar, packed.coarsest.0);
+    Ok(ExitCode::SUCCESS)
+}
