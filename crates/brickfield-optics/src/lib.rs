@@ -6,6 +6,7 @@ mod difference;
 mod histogram;
 mod narrow_peak;
 mod opacity;
+mod prefiltered;
 #[cfg(feature = "color")]
 mod presets;
 mod quadrature;
@@ -21,6 +22,7 @@ pub use narrow_peak::{NarrowPeak, narrow_peak};
 pub use opacity::{OPAQUE_DEPTH, alpha, depth, rescale_alpha, transmittance};
 #[cfg(feature = "color")]
 pub use presets::{Preset, PresetScale};
+pub use prefiltered::{ValueSpread, expected_optics};
 pub use quadrature::{QuadratureRule, RayState, Segment, preintegrate};
 #[cfg(feature = "files")]
 pub use transfer_file::{

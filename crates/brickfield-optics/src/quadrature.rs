@@ -96,13 +96,27 @@ impl QuadratureRule {
     /// # Panics
     /// If there are fewer values than nodes.
     pub fn segment(self, transfer: &TransferFunction, values: &[f64], length_world: f64) -> Segment {
+        self.classified(|node| transfer.at(values[node]), length_world)
+            .unwrap_or_else(|| preintegrate(transfer, values[0], values[1], length_world))
+    }
+
+    /// A segment of length `length_world` whose nodes have these optics (one per node); `None` of [`PreIntegrated`](Self::PreIntegrated),
+    /// which looks at the values between its nodes.
+    ///
+    /// # Panics
+    /// If there are fewer optics than nodes.
+    pub fn segment_of(self, nodes: &[Optics], length_world: f64) -> Option<Segment> {
+        self.classified(|node| nodes[node], length_world)
+    }
+
+    fn classified(self, optics: impl Fn(usize) -> Optics, length_world: f64) -> Option<Segment> {
         match self {
-            QuadratureRule::LeftRiemann => euler(transfer.at(values[0]), length_world),
+            QuadratureRule::LeftRiemann => Some(euler(optics(0), length_world)),
             QuadratureRule::LeftExponential | QuadratureRule::MidpointExponential => {
-                exponential(transfer.at(values[0]), length_world)
+                Some(exponential(optics(0), length_world))
             }
-            QuadratureRule::PreIntegrated => preintegrate(transfer, values[0], values[1], length_world),
-            QuadratureRule::Gauss2 => gauss2(transfer.at(values[0]), transfer.at(values[1]), length_world),
+            QuadratureRule::PreIntegrated => None,
+            QuadratureRule::Gauss2 => Some(gauss2(optics(0), optics(1), length_world)),
         }
     }
 }
