@@ -5,10 +5,9 @@ use std::fmt;
 /// A second datum of every sample, kept beside the values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Companion {
-    /// How far the voxels that a sample averages lie around it: half the width of the uniform distribution that stands for them.
+    /// The standard deviation of the voxels that a sample averages: 0 at level 0.
     ///
-    /// That is sqrt(3) standard deviations, or less: the distribution does not leave the range of these voxels. 0 at level 0. One byte,
-    /// in 255ths of the source's greatest spread: the nearest that does not leave the range either.
+    /// One byte: the nearest 255th of the source's greatest spread.
     Spread,
 }
 

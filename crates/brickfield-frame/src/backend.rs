@@ -144,7 +144,7 @@ pub enum ShaderFunction {
     Alpha,
     /// x: opacity. Returns x: optical depth (`brickfield_optics::depth`).
     Depth,
-    /// x: data value. Returns linear RGB and extinction.
+    /// x: data value. Returns linear RGB and extinction. Of a plan with spreads: x: mean, y: standard deviation, z, w: range of values.
     Classify,
     /// x, y: data values at the rule's nodes, z: length in world units. Returns emission and depth.
     Segment,

@@ -20,11 +20,13 @@ pub enum Feature {
     ShortBlocks,
     /// The transfer function has several knots, and needs a lookup.
     TransferLookup,
+    /// Samples have spreads, and nodes the optics that are expected of the values around them.
+    Prefiltered,
 }
 
 impl Feature {
     /// All features.
-    pub const ALL: [Feature; 8] = [
+    pub const ALL: [Feature; 9] = [
         Feature::HardwareFilter,
         Feature::EarlyTermination,
         Feature::SkipEmpty,
@@ -33,6 +35,7 @@ impl Feature {
         Feature::MultiLevel,
         Feature::ShortBlocks,
         Feature::TransferLookup,
+        Feature::Prefiltered,
     ];
 
     /// The feature's name in shader conditions (`@if(name)`) and reports.
@@ -46,6 +49,7 @@ impl Feature {
             Feature::MultiLevel => "multi_level",
             Feature::ShortBlocks => "short_blocks",
             Feature::TransferLookup => "transfer_lookup",
+            Feature::Prefiltered => "prefiltered",
         }
     }
 }

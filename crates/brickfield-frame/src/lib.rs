@@ -27,8 +27,8 @@ pub use brickfield_optics::QuadratureRule;
 pub use content::{Chunk, Chunked, ContentId, HeldChunks};
 pub use feature::{Feature, FeatureSet};
 pub use field::{
-    AtlasShape, BlockPlaces, BlockRow, BlockSamples, Decode, Field, FieldError, IndexEntry, IndexGrid, IndexLattice,
-    Join, Packing, Places, Reach, Room, RoomChange, SampleFormat, Slots, SlotsError, TextureShape,
+    AtlasShape, BlockPlaces, BlockRanges, BlockRow, BlockSamples, Decode, Field, FieldError, IndexEntry, IndexGrid,
+    IndexLattice, Join, Packing, Places, Reach, Room, RoomChange, SampleFormat, Slots, SlotsError, TextureShape,
 };
 pub use pass::Pass;
 pub use plan::{Drawing, FramePlan, PlanError, PlanParts};

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use brickfield_core::glam::{UVec2, UVec3};
-use brickfield_core::{Aabb, TransferFunction};
+use brickfield_core::{Aabb, Companion, TransferFunction};
+use brickfield_optics::QuadratureRule;
 
 use crate::{
     Beams, DarkRegions, Division, Feature, FeatureSet, Field, Mode, Occupancy, Placement, ProxyGeometry, RayFrame,
-    SampleFormat, Sampling, Target, ValueScale,
+    SampleFormat, Sampling, Slots, Target, ValueScale,
 };
 
 /// Everything that a backend needs for one frame, and nothing that this frame does not need.
@@ -90,6 +91,12 @@ pub enum PlanError {
     RoundPolygons,
     #[error("polygons of whole rays: they are clipped to bricks; divide bricks")]
     PolygonsOfRays,
+    #[error(
+        "spreads of samples with the rule {}: it looks at the values between its nodes; take another rule", QuadratureRule::PreIntegrated.name()
+    )]
+    PreIntegratedSpreads,
+    #[error("spreads of samples without the ranges of their blocks: the values that they stand for have no ends")]
+    SpreadsWithoutRanges,
     #[error("a block to be drawn at index cell {cell}, which is not resident in an index of {dims}")]
     NotResident { cell: UVec3, dims: UVec3 },
 }
@@ -98,7 +105,7 @@ impl FramePlan {
     /// The plan of some parts.
     ///
     /// # Errors
-    /// A domain outside of the volume; dark regions of another field; polygons of surfaces that have none, or of blocks that
+    /// A domain outside of the volume; dark regions of another field; spreads with a rule that looks at values between nodes, or without ranges; polygons of surfaces that have none, or of blocks that
     /// are not resident.
     pub fn new(parts: PlanParts) -> Result<FramePlan, PlanError> {
         check(&parts)?;
@@ -147,6 +154,7 @@ impl FramePlan {
             (Feature::MultiLevel, self.field.has_coarse()),
             (Feature::ShortBlocks, self.field.has_short_blocks()),
             (Feature::TransferLookup, self.transfer.knots().len() > 1),
+            (Feature::Prefiltered, self.spreads().is_some()),
         ];
         needed.into_iter().filter_map(|(feature, is_needed)| is_needed.then_some(feature)).collect()
     }
@@ -217,6 +225,13 @@ impl FramePlan {
         Aabb { min: b.min - self.rays.center, max: b.max - self.rays.center }
     }
 
+    /// The spreads of the samples, by which nodes are classified: of a field that has spreads, if not all of them are 0 and the transfer
+    /// function tells values apart.
+    pub fn spreads(&self) -> Option<&Arc<Slots>> {
+        let is_needed = self.transfer.knots().len() > 1 && self.field.has_coarse();
+        self.field.companions(Companion::Spread).filter(|_| is_needed)
+    }
+
     /// How f32 arithmetic counts data values.
     pub fn value_scale(&self) -> ValueScale {
         ValueScale::of(&self.transfer, self.field.slots().decode())
@@ -252,6 +267,9 @@ fn check(parts: &PlanParts) -> Result<(), PlanError> {
     if !parts.dark.is_of(field) {
         return Err(PlanError::OtherField);
     }
+    if field.companions(Companion::Spread).is_some() {
+        check_prefiltered(field, parts.sampling.rule())?;
+    }
     let Drawing::Polygons { back_to_front, .. } = &parts.drawing else { return Ok(()) };
     if parts.rays.placement == Placement::Shells {
         return Err(PlanError::RoundPolygons);
@@ -264,6 +282,15 @@ fn check(parts: &PlanParts) -> Result<(), PlanError> {
     match back_to_front.iter().find(|cell| !is_resident(cell)) {
         Some(cell) => Err(PlanError::NotResident { cell: *cell, dims }),
         None => Ok(()),
+    }
+}
+
+/// Whether nodes can be classified by spreads.
+fn check_prefiltered(field: &Field, rule: QuadratureRule) -> Result<(), PlanError> {
+    match field.ranges() {
+        _ if rule == QuadratureRule::PreIntegrated => Err(PlanError::PreIntegratedSpreads),
+        None => Err(PlanError::SpreadsWithoutRanges),
+        Some(_) => Ok(()),
     }
 }
 

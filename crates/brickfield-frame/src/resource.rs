@@ -2,8 +2,6 @@
 
 use std::borrow::Cow;
 
-use brickfield_core::Companion;
-
 use crate::{Chunked, FramePlan, KnotUniform, Slots};
 
 /// A buffer, texture or sampler, by the name that it has in shaders (`frame.wesl`).
@@ -29,6 +27,8 @@ pub enum Resource {
     Spreads,
     /// For each flat block that is one sample, its spread.
     OneSpreads,
+    /// For each flat block, its least and its greatest voxel.
+    Ranges,
     /// The transfer function's knots.
     Knots,
     /// The picture that rays are stored to.
@@ -65,7 +65,7 @@ pub enum Content<'a> {
 
 impl Resource {
     /// All resources.
-    pub const ALL: [Resource; 19] = [
+    pub const ALL: [Resource; 20] = [
         Resource::Frame,
         Resource::Atlas,
         Resource::AtlasSampler,
@@ -74,6 +74,7 @@ impl Resource {
         Resource::Blocks,
         Resource::Spreads,
         Resource::OneSpreads,
+        Resource::Ranges,
         Resource::Knots,
         Resource::Picture,
         Resource::Inputs,
@@ -98,6 +99,7 @@ impl Resource {
             Resource::Blocks => "blocks",
             Resource::Spreads => "spreads",
             Resource::OneSpreads => "one_spreads",
+            Resource::Ranges => "ranges",
             Resource::Knots => "knots",
             Resource::Picture => "picture",
             Resource::Inputs => "inputs",
@@ -128,11 +130,9 @@ impl FramePlan {
             Resource::Index => Some(Content::Chunks(&**self.field.index())),
             Resource::Places => self.field.slots().place_table().map(Content::Chunks),
             Resource::Blocks => self.field.slots().block_table().map(Content::Chunks),
-            Resource::Spreads => self.field.companions(Companion::Spread).map(|slots| Content::Texture(slots)),
-            Resource::OneSpreads => {
-                let slots = self.field.companions(Companion::Spread)?;
-                slots.one_table().map(Content::Chunks)
-            }
+            Resource::Spreads => self.spreads().map(|slots| Content::Texture(slots)),
+            Resource::OneSpreads => self.spreads().and_then(|slots| slots.one_table()).map(Content::Chunks),
+            Resource::Ranges => self.spreads().and(self.field.ranges()).map(|ranges| Content::Chunks(ranges.table())),
             Resource::Knots => bytes(bytemuck::cast_slice(&KnotUniform::of(self))),
             Resource::Occupancy => self.occupancy.as_ref().map(|occupancy| Content::Chunks(&**occupancy)),
             Resource::Beams => self.beams.as_ref().and_then(|beams| bytes(bytemuck::cast_slice(&beams.spans()))),

@@ -6,8 +6,8 @@ use brickfield_core::glam::UVec3;
 use brickfield_core::{Aabb, Companion, TransferFunction};
 
 use crate::{
-    Beams, Feature, FeatureSet, Field, FramePlan, IndexGrid, Join, Occupancy, Overview, ProxyGeometry, RayFrame,
-    Sampling, Slots,
+    Beams, BlockRanges, Feature, FeatureSet, Field, FramePlan, IndexGrid, Join, Occupancy, Overview, ProxyGeometry,
+    RayFrame, Sampling, Slots,
 };
 
 /// A plan taken apart. It is put together again without validation: the plan may be wrong in any way.
@@ -19,6 +19,7 @@ pub struct SpoiltPlan {
     pub slots: Arc<Slots>,
     pub join: Join,
     pub companions: [Option<Arc<Slots>>; Companion::ALL.len()],
+    pub ranges: Option<Arc<BlockRanges>>,
     pub rays: RayFrame,
     pub domain: Aabb,
     pub visible: Aabb,
@@ -41,6 +42,7 @@ impl SpoiltPlan {
             slots: field.slots().clone(),
             join: field.join(),
             companions: Companion::ALL.map(|companion| field.companions(companion).cloned()),
+            ranges: field.ranges().cloned(),
             rays,
             domain,
             visible,
@@ -55,8 +57,8 @@ impl SpoiltPlan {
 
     /// The field as it is now.
     pub fn field(&self) -> Field {
-        let companions = self.companions.clone();
-        Field::unchecked(self.dims, self.index.clone(), self.slots.clone(), self.join, companions)
+        let beside = (self.companions.clone(), self.ranges.clone());
+        Field::unchecked(self.dims, self.index.clone(), self.slots.clone(), self.join, beside)
     }
 
     /// The plan as it is now. Beams are traced anew: an error shall be seen, not hidden by beams that know better.

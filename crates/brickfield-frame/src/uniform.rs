@@ -75,8 +75,8 @@ pub struct FrameUniforms {
     pub brick_samples: u32,
     /// The first object-aligned planes that rays towards greater coordinates meet.
     pub planes_low: [f32; 3],
-    /// Nothing.
-    pub padding_1: f32,
+    /// Scale from a spread as it is read to one in units of the value scale; 0 without spreads.
+    pub spread_scale: f32,
     /// The first that rays towards smaller coordinates meet.
     pub planes_high: [f32; 3],
     /// Nothing.
@@ -178,7 +178,7 @@ impl FrameUniforms {
             planes_high: float3(rays.planes.high),
             voxel_world: float3(rays.planes.voxel_world),
             dense_stride: field.dense_level().map_or(1.0, |level| level.stride() as f32),
-            padding_1: 0.0,
+            spread_scale: plan.spreads().map_or(0.0, |slots| (slots.decode().scale / plan.value_scale().unit()) as f32),
             padding_2: 0.0,
             padding_3: 0.0,
             padding_4: [0; 2],

@@ -14,8 +14,12 @@ fn main() {
     divan::main();
 }
 
-const BUDGET: BlockBudget =
-    BlockBudget { size: BudgetSize::Ratio(32.0), scalar: ScalarType::U16, one_sample: OneSampleBlocks::Stored };
+const BUDGET: BlockBudget = BlockBudget {
+    size: BudgetSize::Ratio(32.0),
+    scalar: ScalarType::U16,
+    companion_bytes: 0,
+    one_sample: OneSampleBlocks::Stored,
+};
 
 /// All of it: errors of every block, and the budget spent.
 #[divan::bench]

@@ -21,12 +21,17 @@ fn choices(layout: &BlockLayout, errors: &[LevelErrors], weights: &[f32], budget
         let choice = levels.map(|level| {
             let n = u64::from(layout.n_samples(block, level).element_product());
             let is_free = n == 1 && budget.one_sample == OneSampleBlocks::Free;
-            let bytes = if is_free { 0 } else { n * budget.scalar.n_bytes() as u64 };
+            let bytes = if is_free { 0 } else { n * sample_bytes(budget) };
             (bytes, f64::from(weights[i]) * n_voxels * f64::from(errors[i][usize::from(level.0)]))
         });
         choice.collect()
     };
     layout.blocks().enumerate().map(of_block).collect()
+}
+
+/// Bytes of a sample and its companions.
+fn sample_bytes(budget: &BlockBudget) -> u64 {
+    budget.scalar.n_bytes() as u64 + u64::from(budget.companion_bytes)
 }
 
 /// The least cost of all combinations within a budget; every number of bytes is a multiple of `unit`.
@@ -93,14 +98,15 @@ fn cases() -> impl Strategy<Value = Case> {
     let parts = layouts().prop_flat_map(|layout| {
         let n = layout.n_blocks_total();
         let weights = proptest::collection::vec(prop_oneof![Just(1.0f32), Just(0.0), 0.1f32..3.0], n);
-        (Just(layout), errors(n), weights, 0.0..1.1f64, any::<bool>())
+        (Just(layout), errors(n), weights, 0.0..1.1f64, (any::<bool>(), 0..4u8))
     });
-    parts.prop_map(|(layout, errors, weights, part, is_free)| {
+    parts.prop_map(|(layout, errors, weights, part, (is_free, companion_bytes))| {
         let (scalar, n_blocks) = (ScalarType::U16, layout.n_blocks_total() as u64);
-        let whole = 2 * layout.dims().as_u64vec3().element_product();
-        let size = BudgetSize::Bytes(2 * n_blocks + ((whole - (2 * n_blocks).min(whole)) as f64 * part) as u64);
+        let of_sample = 2 + u64::from(companion_bytes);
+        let (least, whole) = (of_sample * n_blocks, of_sample * layout.dims().as_u64vec3().element_product());
+        let size = BudgetSize::Bytes(least + ((whole - least.min(whole)) as f64 * part) as u64);
         let one_sample = if is_free { OneSampleBlocks::Free } else { OneSampleBlocks::Stored };
-        Case { layout, errors, weights, budget: BlockBudget { size, scalar, one_sample } }
+        Case { layout, errors, weights, budget: BlockBudget { size, scalar, companion_bytes, one_sample } }
     })
 }
 
@@ -115,7 +121,7 @@ proptest! {
         let rounding = 1e-9 * blocks.iter().map(|c| c[0].1).sum::<f64>();
         prop_assert!(selection.n_bytes == n_bytes && n_bytes <= budget_bytes);
         prop_assert!((selection.cost - cost).abs() <= rounding, "{} {cost}", selection.cost);
-        let least = least_cost(&blocks, budget_bytes, 2);
+        let least = least_cost(&blocks, budget_bytes, sample_bytes(&budget));
         let step = blocks.iter().map(greatest_step).fold(0.0, f64::max);
         prop_assert!(least - rounding <= cost && cost <= least + step + rounding, "{cost}: {least} + {step}");
     }
@@ -150,7 +156,7 @@ fn layout() -> BlockLayout {
 }
 
 fn budget(size: BudgetSize) -> BlockBudget {
-    BlockBudget { size, scalar: ScalarType::U8, one_sample: OneSampleBlocks::Stored }
+    BlockBudget { size, scalar: ScalarType::U8, companion_bytes: 0, one_sample: OneSampleBlocks::Stored }
 }
 
 const FALLING: LevelErrors = [0.0, 1.0, 3.0, 7.0, 15.0, 0.0];

@@ -20,9 +20,9 @@ pub use automatic::{automatic, diagonal_world};
 pub use difference::{ColorDifferences, ColorMetric, PixelCountError, cie_luv};
 pub use narrow_peak::{NarrowPeak, narrow_peak};
 pub use opacity::{OPAQUE_DEPTH, alpha, depth, rescale_alpha, transmittance};
+pub use prefiltered::{ValueSpread, expected_optics};
 #[cfg(feature = "color")]
 pub use presets::{Preset, PresetScale};
-pub use prefiltered::{ValueSpread, expected_optics};
 pub use quadrature::{QuadratureRule, RayState, Segment, preintegrate};
 #[cfg(feature = "files")]
 pub use transfer_file::{

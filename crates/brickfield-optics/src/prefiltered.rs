@@ -93,7 +93,9 @@ impl Sum {
 
     fn optics(self) -> Optics {
         match self.extinction > 0.0 {
-            true => Optics { extinction: self.extinction, color: self.emission.map(|c| (c / self.extinction).min(1.0)) },
+            true => {
+                Optics { extinction: self.extinction, color: self.emission.map(|c| (c / self.extinction).min(1.0)) }
+            }
             false => Optics::default(),
         }
     }

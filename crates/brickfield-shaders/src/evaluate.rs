@@ -4,14 +4,20 @@ use brickfield_frame::{FramePlan, ShaderFunction};
 
 /// The inputs of a function as shaders take them: data values as numbers of the plan's value scale.
 pub fn shader_inputs(plan: &FramePlan, function: ShaderFunction, inputs: &[[f32; 4]]) -> Vec<[f32; 4]> {
-    let n_values = match function {
-        ShaderFunction::Classify => 1,
-        ShaderFunction::Segment => 2,
-        _ => 0,
+    let has_spreads = plan.spreads().is_some();
+    let is_value = |i: usize| match function {
+        ShaderFunction::Classify => i == 0 || (has_spreads && i > 1),
+        ShaderFunction::Segment => i < 2,
+        _ => false,
     };
+    let is_deviation = |i: usize| function == ShaderFunction::Classify && has_spreads && i == 1;
     let values = plan.value_scale();
-    let number = |x: f32| values.number(x.into()) as f32;
-    inputs.iter().map(|x| std::array::from_fn(|i| if i < n_values { number(x[i]) } else { x[i] })).collect()
+    let input = |x: &[f32; 4], i: usize| match i {
+        i if is_value(i) => values.number(x[i].into()) as f32,
+        i if is_deviation(i) => (f64::from(x[i]) / values.unit()) as f32,
+        i => x[i],
+    };
+    inputs.iter().map(|x| std::array::from_fn(|i| input(x, i))).collect()
 }
 
 /// The outputs of a function as callers expect them, from a shader's outputs.

@@ -27,7 +27,7 @@ const fn one_of(path: &'static str, name: &'static str, text: &'static str) -> M
     Module { name, path, text: Cow::Borrowed(text) }
 }
 
-const EMBEDDED: [Module; 22] = [
+const EMBEDDED: [Module; 23] = [
     own("frame", include_str!("wesl/frame.wesl")),
     own("scalar", include_str!("wesl/scalar.wesl")),
     own("transfer", include_str!("wesl/transfer.wesl")),
@@ -41,6 +41,7 @@ const EMBEDDED: [Module; 22] = [
     own("interblock", include_str!("wesl/interblock.wesl")),
     own("quadrature", include_str!("wesl/quadrature.wesl")),
     own("preintegrated", include_str!("wesl/preintegrated.wesl")),
+    own("prefiltered", include_str!("wesl/prefiltered.wesl")),
     own("segments", include_str!("wesl/segments.wesl")),
     own("ending", include_str!("wesl/ending.wesl")),
     one_of("integrate", "integrate/constant", include_str!("wesl/integrate/constant.wesl")),

@@ -63,10 +63,16 @@ fn rounds_of_bricks(plan: &FramePlan) -> f64 {
 fn rounds_per_segment(plan: &FramePlan) -> f64 {
     let rule = plan.sampling().rule();
     let n_knots = plan.transfer().knots().len() as f64;
-    let pieces = if rule == QuadratureRule::PreIntegrated { n_knots + 1.0 } else { 0.0 };
+    let n_nodes = rule.nodes().len() as f64;
+    let pieces = match rule {
+        QuadratureRule::PreIntegrated => n_knots + 1.0,
+        // Two halves.
+        _ if plan.spreads().is_some() => (n_knots + 3.0) * n_nodes,
+        _ => 0.0,
+    };
     let search = match KnotSearch::of(plan) {
         KnotSearch::Unrolled(_) => 0.0,
-        KnotSearch::Loop => (n_knots.log2() + 1.0).floor() * rule.nodes().len() as f64,
+        KnotSearch::Loop => (n_knots.log2() + 1.0).floor() * n_nodes,
     };
     3.0 + pieces + search
 }

@@ -62,7 +62,8 @@ impl FieldKind {
         match plan.field().slots().places() {
             Places::Even(_) => FieldKind::Bricks,
             Places::Table { .. } => FieldKind::Placed,
-            Places::Blocks(_) if plan.field().dense_level().is_some() => FieldKind::Dense,
+            // Of the samples of one array nobody knows which block's range they have.
+            Places::Blocks(_) if plan.field().dense_level().is_some() && plan.spreads().is_none() => FieldKind::Dense,
             Places::Blocks(_) => FieldKind::Blocks(plan.field().join()),
         }
     }
@@ -279,6 +280,13 @@ impl Variant {
         READS_FIELD.into_iter().any(|f| self.features.contains(f)) || self.segments.division == Division::Brick
     }
 
+    /// Whether nodes have spreads: only samples of flat blocks do, and the rule looks at nodes alone.
+    fn is_prefiltered(self) -> bool {
+        let is_classified =
+            self.features.contains(Feature::TransferLookup) && self.rule != QuadratureRule::PreIntegrated;
+        self.features.contains(Feature::Prefiltered) && matches!(self.field, FieldKind::Blocks(_)) && is_classified
+    }
+
     /// The shader that reads textures one way. It has nothing of a plan's.
     pub fn probe(fetch: Fetch) -> Variant {
         Variant::new(FeatureSet::default(), QuadratureRule::MidpointExponential, Entry::Probe(fetch))
@@ -287,7 +295,8 @@ impl Variant {
     /// The conditions (`@if(name)`) that hold.
     pub(crate) fn conditions(self) -> Vec<(String, bool)> {
         let has = |f| self.features.contains(f);
-        let features = Feature::ALL.into_iter().map(|f| (f.name().to_owned(), has(f)));
+        let holds = |f| has(f) && (f != Feature::Prefiltered || self.is_prefiltered());
+        let features = Feature::ALL.into_iter().map(|f| (f.name().to_owned(), holds(f)));
         let rules = QuadratureRule::ALL.into_iter().map(|r| (condition_of_rule(r), r == self.rule));
         let evaluated = |f| self.entry == Entry::Evaluate(f);
         let functions = ShaderFunction::ALL.into_iter().map(|f| (format!("evaluate_{}", f.name()), evaluated(f)));

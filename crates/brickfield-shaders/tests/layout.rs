@@ -82,6 +82,8 @@ fn assert_rows() {
         n_knots,
         atlas_bricks,
         brick_samples,
+        planes_low,
+        spread_scale,
         size,
         first_row,
         beam_pixels,
@@ -95,7 +97,7 @@ fn assert_rows() {
     let library = brickfield_shaders::ShaderLibrary::embedded();
     let (_, text) = library.modules().find(|(name, _)| *name == "frame").unwrap();
     let functions: Vec<&str> = text.split("\nfn ").skip(1).collect();
-    assert_eq!(functions.len(), 19);
+    assert_eq!(functions.len(), 20);
     for function in functions {
         let name = function.split('(').next().unwrap();
         let read = function.split("return frame.").nth(1).unwrap().split(';').next().unwrap();

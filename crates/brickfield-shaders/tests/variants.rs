@@ -52,7 +52,9 @@ fn variant(options: &[usize; N_OPTIONS]) -> Option<Variant> {
     let is_asked_for = (!is_nominal || variant.rule == QuadratureRule::MidpointExponential)
         && (variant.entry != Entry::Proxy || is_drawn)
         && (variant.field == FieldKind::Bricks || !features.contains(Feature::SkipMacrocells))
-        && (is_of_blocks || !features.contains(Feature::ShortBlocks));
+        && (is_of_blocks || !features.contains(Feature::ShortBlocks))
+        && (matches!(variant.field, FieldKind::Blocks(_)) || !features.contains(Feature::Prefiltered))
+        && (variant.rule != QuadratureRule::PreIntegrated || !features.contains(Feature::Prefiltered));
     is_asked_for.then_some(variant)
 }
 
@@ -105,6 +107,9 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
                 let is_of_blocks = matches!(variant.field, FieldKind::Blocks(_));
                 assert_eq!(uses(Resource::Blocks), uses(Resource::Index) && is_of_blocks);
                 assert!(!reads || uses(Resource::Atlas));
+                let is_prefiltered = reads && variant.features.contains(Feature::Prefiltered);
+                let of_spreads = [Resource::Spreads, Resource::OneSpreads, Resource::Ranges];
+                assert!(of_spreads.into_iter().all(|resource| uses(resource) == is_prefiltered));
             }
             Entry::Proxy => {
                 assert_eq!(shader.module.entry_points.len(), 2);
@@ -176,7 +181,7 @@ fn what_a_scene_does_not_need_is_left_out() {
     };
     for feature in Feature::ALL.into_iter().filter(|f| *f != Feature::HardwareFilter) {
         let (with, without) = match feature {
-            Feature::ShortBlocks => {
+            Feature::ShortBlocks | Feature::Prefiltered => {
                 let features = all.without(Feature::SkipMacrocells);
                 (of_blocks(features), of_blocks(features.without(feature)))
             }

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use brickfield_bricks::{BlockSource, FetchError, SourceId, greatest_spread};
 use brickfield_core::glam::UVec3;
-use brickfield_core::{BlockLayout, BlockSide, Companion, Level};
+use brickfield_core::{BlockLayout, BlockSide, Companion, Level, ValueRange};
 use brickfield_frame::{
-    BlockPlaces, BlockRow, BlockSamples, Chunk, Decode, Field, IndexEntry, IndexGrid, IndexLattice, Join, Packing,
-    Places, Reach, SampleFormat, Slots,
+    BlockPlaces, BlockRanges, BlockRow, BlockSamples, Chunk, Decode, Field, IndexEntry, IndexGrid, IndexLattice, Join,
+    Packing, Places, Reach, SampleFormat, Slots,
 };
 use rayon::prelude::*;
 
@@ -33,6 +33,8 @@ struct Held {
     rows: Vec<BlockRow>,
     chunks: Vec<Option<Arc<Chunk>>>,
     companions: BTreeMap<Companion, HeldCompanions>,
+    /// The ranges of the blocks, once a frame had spreads.
+    ranges: Option<Arc<BlockRanges>>,
     /// Whether blocks have come or moved since the last field.
     has_changed: bool,
     /// The last field, and the blocks that are drawn in it.
@@ -136,6 +138,13 @@ impl BlockResidency {
             let slots = own.slots(source, *companion, &field, last);
             field.with_companions(*companion, slots).expect("companions of the samples")
         });
+        let field = match held.companions.contains_key(&Companion::Spread) {
+            true => {
+                let ranges = Arc::clone(held.ranges.get_or_insert_with(|| Arc::new(Coding::of(source).ranges(source))));
+                field.with_ranges(ranges).expect("a range for each block")
+            }
+            false => field,
+        };
         held.has_changed = false;
         held.companions.values_mut().for_each(|companions| companions.has_changed = false);
         held.field = Some((drawn, field.clone()));
@@ -161,7 +170,8 @@ impl Held {
         };
         let row = BlockRow { level: side.one_sample(), samples: BlockSamples::One(0.0) };
         let (rows, chunks, companions) = (vec![row; levels.len()], vec![None; levels.len()], BTreeMap::new());
-        Held { source: source.id(), arrangement, rows, chunks, companions, has_changed: true, field: None }
+        let ranges = None;
+        Held { source: source.id(), arrangement, rows, chunks, companions, ranges, has_changed: true, field: None }
     }
 
     fn dense_level(&self) -> Option<Level> {
@@ -363,6 +373,16 @@ impl Coding {
         Coding { format, stored }
     }
 
+    /// The ranges of all blocks, as texture reads would return them.
+    fn ranges(&self, source: &dyn BlockSource) -> BlockRanges {
+        let read = |stored: f64| ((stored - self.stored.offset) / self.stored.scale) as f32;
+        let reads = source.summaries().iter().map(|summary| {
+            let ValueRange { min, max } = source.rescale().stored_range(summary.range);
+            [read(min), read(max)]
+        });
+        BlockRanges::new(reads.collect())
+    }
+
     fn fetch(&self, source: &dyn BlockSource, ordinal: usize, level: Level) -> Result<Vec<u8>, FetchError> {
         let mut bytes = Vec::new();
         source.fetch(source.layout().block(ordinal), level, &mut bytes)?;
@@ -374,7 +394,7 @@ impl Coding {
 mod tests {
     use brickfield_bricks::{BlockOptions, BlockVolume, NoCompanion, build_blocks};
     use brickfield_core::glam::DVec3;
-    use brickfield_core::{Grid, Rescale, ScalarType, ValueRange, Volume};
+    use brickfield_core::{Grid, Rescale, ScalarType, Volume};
     use proptest::prelude::*;
 
     use super::*;

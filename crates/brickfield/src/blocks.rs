@@ -2,8 +2,8 @@
 
 use brickfield_bricks::{BlockSource, FetchError};
 use brickfield_core::glam::UVec3;
-use brickfield_core::{Aabb, BlockLayout, BlockSide, Level, Projection, TransferFunction, ValueRange};
-use brickfield_frame::{Drawing, FramePlan, IndexEntry, Join, PlanError, PlanParts};
+use brickfield_core::{Aabb, BlockLayout, BlockSide, Companion, Level, Projection, TransferFunction, ValueRange};
+use brickfield_frame::{Drawing, FramePlan, IndexEntry, Join, PlanError, PlanParts, QuadratureRule};
 use rayon::prelude::*;
 
 use crate::course::{Course, segment_reach, to_sample_space};
@@ -17,6 +17,19 @@ pub struct BlockStyle {
     pub join: Join,
     /// What is drawn inside blocks that are transparent.
     pub transparent: TransparentBlocks,
+    /// Which optics coarse samples have.
+    pub classification: Classification,
+}
+
+/// Which optics a node between coarse samples has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Classification {
+    /// Those of the interpolated average: narrow features vanish at coarse levels.
+    #[default]
+    OfMean,
+    /// The mean of those of the voxels around it, by the spreads of samples ([`Companion::Spread`]). A byte more for each sample; not with
+    /// [`QuadratureRule::PreIntegrated`].
+    Prefiltered,
 }
 
 /// What is drawn inside a block all of whose voxels are transparent, next to one that is not.
@@ -66,9 +79,12 @@ pub fn prepare_blocks(
     check_size(scene.size)?;
     check_values(source.range())?;
     check_levels(source.layout(), levels)?;
+    if style.classification == Classification::Prefiltered && scene.rule == QuadratureRule::PreIntegrated {
+        return Err(PlanError::PreIntegratedSpreads.into());
+    }
     let coarsest = levels.iter().copied().max().unwrap_or(Level(0));
     let Course { domain, sampling, rays } = Course::new(source.grid(), scene, coarsest)?;
-    residency.hold(source, levels, &[])?;
+    residency.hold(source, levels, companions(scene, levels, style.classification))?;
     let style = match scene.quality {
         Quality::Final => style,
         Quality::Draft => BlockStyle { join: Join::Shared, ..style },
@@ -83,6 +99,15 @@ pub fn prepare_blocks(
     let field = residency.field(source, drawn, style.join);
     let parts = PlanParts::new(field, rays, domain, sampling, scene.transfer.clone());
     Ok(FramePlan::new(PlanParts { drawing, ..parts })?)
+}
+
+/// The companions that a frame needs: where all samples are voxels, or all values look alike, spreads change nothing.
+fn companions(scene: &Scene, levels: &[Level], classification: Classification) -> &'static [Companion] {
+    let is_coarse = levels.iter().any(|level| *level > Level(0));
+    match classification {
+        Classification::Prefiltered if is_coarse && scene.transfer.knots().len() > 1 => &[Companion::Spread],
+        _ => &[],
+    }
 }
 
 fn check_levels(layout: &BlockLayout, levels: &[Level]) -> Result<(), PrepareBlocksError> {
@@ -185,8 +210,11 @@ mod tests {
     use super::*;
     use crate::{BackendKind, Validation, open_backend};
 
-    const BLENDED: BlockStyle =
-        BlockStyle { join: Join::Blend(Interblock::MaximumDistance), transparent: TransparentBlocks::Empty };
+    const BLENDED: BlockStyle = BlockStyle {
+        join: Join::Blend(Interblock::MaximumDistance),
+        transparent: TransparentBlocks::Empty,
+        classification: Classification::OfMean,
+    };
 
     fn blocks(dims: UVec3) -> BlockVolume {
         let grid = Grid::axis_aligned(dims, DVec3::ONE).unwrap();

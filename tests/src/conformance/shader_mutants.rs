@@ -157,6 +157,30 @@ mutants! {
         => "vec3u((b >> 1u) & 1u, b & 1u, b >> 2u)";
     /// Blocks of one sample are black.
     ONE_SAMPLE_FORGOTTEN: "one-sample-forgotten", "field/blocks", "read_among", "counted(samples.one)" => "counted(0.0)";
+    /// Values are classified by their mean alone.
+    SPREADS_IGNORED: "spreads-ignored", "field/blocks", "node_at", "spread_of(read.y)" => "0.0";
+    /// Blocks of one sample have no spread.
+    ONE_SPREADS_FORGOTTEN: "one-spreads-forgotten", "field/blocks", "read_among",
+        "unpack4x8unorm(one_spreads[cell_number(cell)]).x" => "0.0";
+    /// The spread of the nearest sample.
+    NEAREST_SPREAD: "nearest-spread", "texels", "filtered_spread", "let f = s - cell;" => "let f = floor(s - cell + 0.5);";
+    /// Spreads of hardware filters are half a texel beside.
+    SPREAD_HALF_TEXEL: "spread-half-texel", "texels", "filtered_spread", "(texel + s + 0.5)" => "(texel + s)";
+    /// All blocks have the range of the first.
+    RANGE_OF_FIRST_BLOCK: "range-of-first-block", "field/blocks", "read_among", "ranges[cell_number(cell)]" => "ranges[0u]";
+    /// Values reach one standard deviation.
+    ONE_DEVIATION: "one-deviation", "prefiltered", "SQRT_3", "1.7320508" => "1.0";
+    /// A half does not make good what the range takes of the other.
+    VARIANCE_LOST: "variance-lost", "prefiltered", "expected",
+        "max(vec2f(wanted), wanted * (wanted / max(room.yx, vec2f(NO_ROOM))))" => "vec2f(wanted)";
+    /// Values may leave the range of their blocks.
+    NO_RANGE: "no-range", "prefiltered", "expected", "let reach = min(farther, room);" => "let reach = vec2f(wanted);";
+    /// Both halves hold as many values.
+    HALVES_ALIKE: "halves-alike", "prefiltered", "expected", "(reach.x / (reach.x + reach.y))" => "0.5";
+    /// Colours are not weighted by extinction.
+    COLORS_UNWEIGHTED: "colors-unweighted", "prefiltered", "emitted",
+        "((2.0 * near.w + far.w) * near.rgb + (near.w + 2.0 * far.w) * far.rgb) / 6.0"
+        => "0.25 * (near.w + far.w) * (near.rgb + far.rgb)";
     /// Maximum distance ends at the face.
     MAXIMUM_TO_THE_FACE: "maximum-to-the-face", "interblock", "edge_weights", "(rho + lower) / (lower + upper)"
         => "(rho + lower) / lower";

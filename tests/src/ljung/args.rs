@@ -54,6 +54,8 @@ pub enum Part {
     Rank,
     /// Levels after an edit of the transfer function: time and bytes
     Reselect,
+    /// Classification of averages against prefiltered classification: error and bytes
+    Classify,
     /// Pictures of each volume, with and without interpolation between blocks
     Figures,
 }
@@ -70,13 +72,14 @@ impl Part {
             Part::Cost => "Cost of interpolation between blocks",
             Part::Rank => "Estimated and exact error of blocks",
             Part::Reselect => "Reselection after an edit of the transfer function",
+            Part::Classify => "Prefiltered classification",
             Part::Figures => "Pictures",
         }
     }
 
     /// Whether it reads real volumes.
     pub(super) const fn needs_data(self) -> bool {
-        matches!(self, Part::Table | Part::Cost | Part::Rank | Part::Figures)
+        matches!(self, Part::Table | Part::Cost | Part::Rank | Part::Classify | Part::Figures)
     }
 }
 

@@ -72,7 +72,13 @@ fn of_volume(
 impl DataSet {
     /// The levels that a budget buys, whatever the view: one-sample blocks take no texel.
     pub(super) fn select(&self, size: BudgetSize) -> Result<BlockSelection, PaperError> {
-        let budget = BlockBudget { size, scalar: self.blocks.scalar_type(), one_sample: OneSampleBlocks::Free };
+        self.select_beside(size, 0)
+    }
+
+    /// The same for samples with companions of so many bytes.
+    pub(super) fn select_beside(&self, size: BudgetSize, companion_bytes: u8) -> Result<BlockSelection, PaperError> {
+        let (scalar, one_sample) = (self.blocks.scalar_type(), OneSampleBlocks::Free);
+        let budget = BlockBudget { size, scalar, companion_bytes, one_sample };
         Ok(select_block_levels(self.blocks.layout(), self.errors.levels(), None, &budget)?)
     }
 

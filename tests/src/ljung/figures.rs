@@ -32,9 +32,7 @@ fn of_data_set(args: &LjungArgs, rivals: &mut Rivals, data: &DataSet) -> Result<
     let scene = data.scene(args, Mode::Exact)?;
     let levels = data.select(BudgetSize::Ratio(32.0))?.levels;
     let answer = answer(data, &scene);
-    let full = Image::new(answer.size(), answer.pixels().iter().map(|p| p.map(|c| c as f32)).collect());
-    let full = full.expect("as many pixels");
-    let (mut pictures, mut differences) = (vec![full.clone()], vec![Image::transparent(answer.size())]);
+    let (mut pictures, mut differences) = (vec![full(&answer)], vec![Image::transparent(answer.size())]);
     for join in joins() {
         let plan = prepare_blocks(&data.blocks, &scene, levels.levels(), style(join), &mut BlockResidency::default())?;
         let name = backend.describe().backend;
@@ -42,16 +40,26 @@ fn of_data_set(args: &LjungArgs, rivals: &mut Rivals, data: &DataSet) -> Result<
         differences.push(difference(&frame.image, &answer));
         pictures.push(frame.image);
     }
-    let name =
-        data.name.rsplit('/').next().unwrap_or(&data.name).split('.').next().unwrap_or_default().replace(' ', "-");
     let what = format!(
         "{} at 32:1: full resolution, nearest block, minimum distance, boundary split, maximum distance; below, Delta E from 0 to {BRIGHT}",
         data.name
     );
-    args.common.write_picture(&format!("figure8-{name}"), &stacked(&[beside(&pictures), beside(&differences)]), &what)
+    let name = format!("figure8-{}", file_name(&data.name));
+    args.common.write_picture(&name, &stacked(&[beside(&pictures), beside(&differences)]), &what)
 }
 
-fn difference(image: &Image<f32>, answer: &Image<f64>) -> Image<f32> {
+/// The answer as a picture.
+pub(super) fn full(answer: &Image<f64>) -> Image<f32> {
+    answer.map(|channel| channel as f32)
+}
+
+/// The name of a data set as a part of a file's.
+pub(super) fn file_name(data: &str) -> String {
+    data.rsplit('/').next().unwrap_or(data).split('.').next().unwrap_or_default().replace(' ', "-")
+}
+
+/// The colour difference of each pixel.
+pub(super) fn difference(image: &Image<f32>, answer: &Image<f64>) -> Image<f32> {
     let mut out = image.clone();
     for (to, expected) in out.pixels_mut().iter_mut().zip(answer.pixels()) {
         let found = to.map(f64::from);

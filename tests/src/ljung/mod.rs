@@ -4,10 +4,12 @@
 //! - `gradient`: figure 7, a rotated linear gradient at random resolutions. `weights`: figures 4 and 5, read back from backends.
 //! - `continuity`: jumps on faces, edges and corners; equal resolutions against trilinear interpolation.
 //! - `accounting`: figure 9. `table`: error, time, samples and bytes at several budgets. `cost`: schemes against the nearest block.
-//! - `rank`: estimated errors of blocks against exact ones. `reselect`: after an edit of the transfer function. `figures`: pictures.
+//! - `rank`: estimated errors of blocks against exact ones. `reselect`: after an edit of the transfer function. `classify`: prefiltered
+//!   classification. `figures`: pictures.
 
 mod accounting;
 mod args;
+mod classify;
 mod continuity;
 mod cost;
 mod data;
@@ -38,6 +40,7 @@ pub fn ljung(args: &LjungArgs) -> Result<Findings, PaperError> {
         Part::Cost => cost::run(args, rivals),
         Part::Rank => rank::run(args),
         Part::Reselect => reselect::run(args),
+        Part::Classify => classify::run(args, rivals),
         Part::Figures => figures::run(args, rivals),
     })
 }

@@ -30,8 +30,12 @@ pub(super) fn run(args: &LjungArgs) -> Result<Vec<Missed>, PaperError> {
     let blocks = build_blocks(Arc::new(volume), &BlockOptions { side: BlockSide::V8, ..BlockOptions::default() })?;
     let layout = *blocks.layout();
     let slab = Slab::of_block(&layout, blocks.grid());
-    let budget =
-        BlockBudget { size: BudgetSize::Ratio(32.0), scalar: blocks.scalar_type(), one_sample: OneSampleBlocks::Free };
+    let budget = BlockBudget {
+        size: BudgetSize::Ratio(32.0),
+        scalar: blocks.scalar_type(),
+        companion_bytes: 0,
+        one_sample: OneSampleBlocks::Free,
+    };
     let camera = Viewpoint::default().camera(blocks.grid(), WorldFrame::Lps, args.common.size)?;
     let mut errors = BlockErrors::estimate(&layout, blocks.summaries(), &transfer, slab)?;
     let mut residency = BlockResidency::default();

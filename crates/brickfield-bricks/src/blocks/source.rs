@@ -115,9 +115,9 @@ impl FetchError {
     }
 }
 
-/// The spread that a [`Companion::Spread`] of 255 stands for, in data values: half of the widest range of a block.
+/// The standard deviation that a [`Companion::Spread`] of 255 stands for, in data values: half of the widest range of a block.
 ///
-/// No spread is greater. 0 if all blocks are constant.
+/// No spread is greater: at most half of the values lie at each end. 0 if all blocks are constant.
 pub fn greatest_spread(source: &dyn BlockSource) -> f64 {
     greatest_of(source.summaries())
 }

@@ -89,12 +89,7 @@ impl Parts {
 
     #[inline]
     pub(super) fn of(&self, stored: f64) -> f64 {
-        self.of_value(self.rescale.value(stored))
-    }
-
-    #[inline]
-    pub(super) fn of_value(&self, value: f64) -> f64 {
-        (value * self.scale - self.min) / self.width
+        (self.rescale.value(stored) * self.scale - self.min) / self.width
     }
 
     /// In units of the data, squared; at most the greatest f64.

@@ -8,7 +8,7 @@ use brickfield_core::{
 };
 
 use super::shrink::BlockVoxels;
-use super::source::{BlockSource, FetchError, SourceId, fetch_values};
+use super::source::{BlockSource, FetchError, SourceId};
 use super::spread::spread_codes;
 use crate::sample::BrickScalar;
 
@@ -106,11 +106,11 @@ impl BlockSource for BlockVolume {
         level: Level,
         out: &mut Vec<u8>,
     ) -> Result<(), FetchError> {
+        FetchError::unless_exists(&self.layout, block, level)?;
         let Companion::Spread = companion;
-        let of_block = (self.summaries[self.layout.ordinal(block)].range, self.rescale());
-        let values = fetch_values(self, block, level)?;
+        let values = (self.summaries[self.layout.ordinal(block)].range, self.rescale());
         *out = with_voxels!(self.volume.voxels(), v => {
-            spread_codes(BlockVoxels::new(v, &self.layout, block), level, of_block, &values, self.greatest_spread)
+            spread_codes(BlockVoxels::new(v, &self.layout, block), level, values, self.greatest_spread)
         });
         Ok(())
     }

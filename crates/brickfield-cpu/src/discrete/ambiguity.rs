@@ -14,13 +14,13 @@
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, Level, Span};
 use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, PlanRay};
-use brickfield_optics::{Segment, alpha, transmittance};
+use brickfield_optics::{Segment, ValueSpread, alpha, transmittance};
 
-use super::change::{Values, difference, spread};
-use super::field::FieldReader;
+use super::change::{Candidates, difference, spread};
+use super::field::{FieldReader, Node};
 use super::straying::straying;
 use super::walk::{CutSegment, clip, middle, parts, segments, whole};
-use super::{part_values, relative, segment};
+use super::{part_nodes, relative, segment};
 use crate::blocks::Blocks;
 
 /// How far the cosines of a ray's angles to planes may be off: a few roundings of numbers below 1.
@@ -100,10 +100,11 @@ impl Ambiguity {
         for part in parts(plan, ray, span) {
             let at = |x: f64| plan.rays().center + ray.at(part.at(x));
             if !rule.nodes().iter().any(|x| self.may_be_close(field, part, at(*x), delta)) {
-                least_depth += segment(plan, part_values(field, ray, part), part.length).depth;
+                least_depth += segment(plan, part_nodes(field, ray, part), part.length).depth;
                 continue;
             }
-            let nodes: Vec<Values> = rule.nodes().iter().map(|x| self.values(field, part, at(*x), delta)).collect();
+            let nodes: Vec<Candidates> =
+                rule.nodes().iter().map(|x| self.candidates(field, part, at(*x), delta)).collect();
             let (change, least) = spread(plan, &nodes, part);
             bound += transmittance(least_depth) * change;
             least_depth += least;
@@ -122,7 +123,7 @@ impl Ambiguity {
             let doubtful = segments(beside, step).filter(|s| is_at_surface(ray.at(middle(s)), &b, delta));
             let segment = |s| {
                 let part = whole(s, nominal, cell);
-                let seen = segment(plan, part_values(field, ray, part), part.length);
+                let seen = segment(plan, part_nodes(field, ray, part), part.length);
                 difference(&seen, &Segment::default())
             };
             doubtful.map(segment).sum::<f64>()
@@ -142,39 +143,66 @@ impl Ambiguity {
         !self.jumps.is_empty() || at_face()
     }
 
-    /// The values that a node of `part` at `q` may have.
-    fn values(&self, field: &impl FieldReader, part: CutSegment, q: DVec3, delta: DVec3) -> Values {
+    /// What a node of `part` at `q` may be.
+    fn candidates(&self, field: &impl FieldReader, part: CutSegment, q: DVec3, delta: DVec3) -> Candidates {
         let q = field.clamped(q);
         let own = part.cell.unwrap_or_else(|| field.cell_at(q));
-        let mut values = vec![field.value(&field.patch_of(own), q)];
-        self.beyond_jumps(field, own, q, delta, &mut values);
+        let mut candidates = vec![field.node(&field.patch_of(own), q)];
+        self.beyond_jumps(field, own, q, delta, &mut candidates);
         if !self.several_kinds || part.cell.is_some() {
-            return values;
+            return candidates;
         }
         let kind = |c: UVec3| Kind::of(field, c);
         let (low, high) = (field.cell_at(q - delta), field.cell_at(q + delta));
         for cell in cells(low, high).filter(|c| kind(*c) != kind(own)) {
-            values.push(field.value(&field.patch_of(cell), q));
-            self.beyond_jumps(field, cell, q, delta, &mut values);
+            candidates.push(field.node(&field.patch_of(cell), q));
+            self.beyond_jumps(field, cell, q, delta, &mut candidates);
         }
-        values
+        candidates
     }
 
-    /// Adds both sides of the jumps that the value in `cell` is close to.
-    fn beyond_jumps(&self, field: &impl FieldReader, cell: UVec3, q: DVec3, delta: DVec3, values: &mut Values) {
+    /// Adds both sides of the jumps that the value in `cell` is close to, and of values around it, with a jump among them, what rounding
+    /// makes of them.
+    fn beyond_jumps(&self, field: &impl FieldReader, cell: UVec3, q: DVec3, delta: DVec3, candidates: &mut Candidates) {
         if self.jumps.is_empty() {
             return;
         }
         let patch = field.patch_of(cell);
-        let (Some(around), Some(value)) = (field.around(&patch, q), field.value(&patch, q)) else { return };
+        let (Some(around), Some(node)) = (field.around(&patch, q), field.node(&patch, q)) else { return };
         let (gain, (min, max)) = (field.gain(), around.range);
-        let offset = field.plan().field().slots().decode().offset;
+        let offset = field.slots().decode().offset;
         let magnitude = gain * min.abs().max(max.abs()) + offset.abs() + self.jumps[0].abs();
-        let reach = gain * field.moved(&patch, q, delta) + ROUNDING * magnitude;
-        for jump in self.jumps.iter().filter(|j| (value - **j).abs() <= reach) {
-            values.extend([Some(jump.next_down()), Some(*jump)]);
+        let of_spread = field.spreads().map_or(0.0, |spreads| spreads.gain() * spreads.moved(&patch, q, delta));
+        let reach = gain * field.moved(&patch, q, delta) + of_spread + ROUNDING * magnitude;
+        for jump in &self.jumps {
+            match node {
+                Node::Value(value) if (value - jump).abs() <= reach => {
+                    candidates.extend([jump.next_down(), *jump].map(|value| Some(Node::Value(value))));
+                }
+                Node::Value(_) => {}
+                Node::Values(values) => candidates.extend(beyond_jump(*jump, &values, reach)),
+            }
         }
     }
+}
+
+/// What rounding by at most `reach` may make of values around a jump; nothing if it lies beyond them.
+fn beyond_jump(jump: f64, values: &ValueSpread, reach: f64) -> Candidates {
+    let [below, above] = values.reach();
+    let (mean, deviation) = (values.mean, values.deviation);
+    if jump < mean - below - 2.0 * reach || jump > mean + above + 2.0 * reach {
+        return Vec::new();
+    }
+    let of =
+        |mean: f64, deviation: f64| Some(Node::Values(ValueSpread { mean, deviation: deviation.max(0.0), ..*values }));
+    let moved = [mean - reach, mean + reach].into_iter();
+    let mut candidates: Candidates =
+        moved.flat_map(|mean| [of(mean, deviation - reach), of(mean, deviation + reach)]).collect();
+    // Most of them may be as near to the mean as the jump is.
+    if (mean - jump).abs() <= reach && below.min(above) <= 2.0 * reach {
+        candidates.extend([jump.next_down(), jump].map(|value| Some(Node::Value(value))));
+    }
+    candidates
 }
 
 /// Whether a point is within `delta` of a box's surface.

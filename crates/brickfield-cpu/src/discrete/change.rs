@@ -3,15 +3,16 @@
 use brickfield_frame::FramePlan;
 use brickfield_optics::{Segment, transmittance};
 
+use super::field::Node;
 use super::segment;
 use super::walk::CutSegment;
 
-/// The values that a node may have; the first is the one it has in f64.
-pub(super) type Values = Vec<Option<f64>>;
+/// What a node may be; first what it is in f64.
+pub(super) type Candidates = Vec<Option<Node>>;
 
 /// How far a segment's contribution may stray, and the least depth it may have.
-pub(super) fn spread(plan: &FramePlan, nodes: &[Values], part: CutSegment) -> (f64, f64) {
-    let second: &[Option<f64>] = nodes.get(1).map_or(&[None], |v| v);
+pub(super) fn spread(plan: &FramePlan, nodes: &[Candidates], part: CutSegment) -> (f64, f64) {
+    let second: &[Option<Node>] = nodes.get(1).map_or(&[None], |v| v);
     let own = segment(plan, [nodes[0][0], second[0]], part.length);
     let (mut change, mut least) = (0.0f64, own.depth);
     if nodes[0].len() * second.len() == 1 {

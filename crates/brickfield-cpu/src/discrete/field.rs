@@ -3,9 +3,10 @@
 use std::marker::PhantomData;
 
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Interblock, Place};
-use brickfield_frame::{BlockPlaces, FramePlan, IndexEntry, Join, Places, SampleFormat};
+use brickfield_core::{Interblock, Place, ValueRange};
+use brickfield_frame::{BlockPlaces, BlockRanges, FramePlan, IndexEntry, Join, Places, SampleFormat, Slots};
 use brickfield_interp::interpolate;
+use brickfield_optics::ValueSpread;
 
 /// How a sample is read from a slot's bytes.
 trait Stored: Sync {
@@ -55,10 +56,22 @@ pub(super) fn with_field<W: Work>(plan: &FramePlan, work: W) -> W::Output {
 }
 
 fn with_join<S: Stored, W: Work>(plan: &FramePlan, work: W) -> W::Output {
-    let shared = Shared::<S> { plan, stored: PhantomData };
+    let shared = Shared::<S> { plan, slots: plan.field().slots(), stored: PhantomData };
     match (plan.field().join(), plan.field().slots().places()) {
-        (Join::Blend(scheme), Places::Blocks(places)) => work.run(&Blended { shared, places, scheme }),
-        _ => work.run(&shared),
+        (Join::Blend(scheme), Places::Blocks(places)) => with_spreads(plan, Blended { shared, places, scheme }, work),
+        _ => with_spreads(plan, shared, work),
+    }
+}
+
+/// Spreads are bytes, whatever the values are; they are interpolated as values are.
+fn with_spreads<W: Work>(plan: &FramePlan, values: impl FieldReader, work: W) -> W::Output {
+    let (Some(slots), Some(ranges)) = (plan.spreads(), plan.field().ranges()) else { return work.run(&values) };
+    let shared = Shared::<Unorm8> { plan, slots, stored: PhantomData };
+    match (plan.field().join(), slots.places()) {
+        (Join::Blend(scheme), Places::Blocks(places)) => {
+            work.run(&Spread { values, spreads: Blended { shared, places, scheme }, ranges })
+        }
+        _ => work.run(&Spread { values, spreads: shared, ranges }),
     }
 }
 
@@ -66,6 +79,15 @@ fn with_join<S: Stored, W: Work>(plan: &FramePlan, work: W) -> W::Output {
 pub(super) trait FieldReader: Sync {
     /// The plan whose field it is.
     fn plan(&self) -> &FramePlan;
+
+    /// The slots whose numbers are read.
+    fn slots(&self) -> &Slots;
+
+    /// The spreads of the field's samples, as a field of their own; `None` where there are none.
+    #[inline]
+    fn spreads(&self) -> Option<&dyn FieldReader> {
+        None
+    }
 
     /// The patch around an index cell.
     #[inline]
@@ -102,20 +124,29 @@ pub(super) trait FieldReader: Sync {
     /// The data value that a patch has at a clamped position; `None` if it is empty.
     #[inline]
     fn value(&self, patch: &Patch, q: DVec3) -> Option<f64> {
-        let slots = self.plan().field().slots();
+        let slots = self.slots();
         Some(slots.decode().value(self.stored(patch, q)? / slots.format().unit()))
     }
 
-    /// The data value at a sample position; `None` where its patch is empty.
+    /// A number at a clamped position of a patch by the numbers of flat blocks, weighted as their values are; `None` if the patch is empty.
+    fn of_blocks(&self, patch: &Patch, q: DVec3, number: &dyn Fn(usize) -> f64) -> Option<f64>;
+
+    /// The values around a node at a clamped position of a patch; `None` if the patch is empty.
     #[inline]
-    fn value_at(&self, q: DVec3) -> Option<f64> {
+    fn node(&self, patch: &Patch, q: DVec3) -> Option<Node> {
+        Some(Node::Value(self.value(patch, q)?))
+    }
+
+    /// The same at a sample position.
+    #[inline]
+    fn node_at(&self, q: DVec3) -> Option<Node> {
         let q = self.clamped(q);
-        self.value(&self.patch_of(self.cell_at(q)), q)
+        self.node(&self.patch_of(self.cell_at(q)), q)
     }
 
     /// Data values between two stored numbers, without sign.
     fn gain(&self) -> f64 {
-        let slots = self.plan().field().slots();
+        let slots = self.slots();
         (slots.decode().scale / slots.format().unit()).abs()
     }
 }
@@ -125,6 +156,25 @@ pub(super) trait FieldReader: Sync {
 pub(super) struct Patch {
     /// Its slot and where that one's samples lie; `None` if nothing is visible there.
     slot: Option<(u32, Place)>,
+}
+
+/// What a node is classified by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Node {
+    /// The data value.
+    Value(f64),
+    /// The data values that the node stands for.
+    Values(ValueSpread),
+}
+
+impl Node {
+    /// The data value, or the mean of several.
+    pub(super) fn value(self) -> f64 {
+        match self {
+            Node::Value(value) => value,
+            Node::Values(values) => values.mean,
+        }
+    }
 }
 
 /// The samples between which a number lies.
@@ -154,6 +204,7 @@ impl Cell {
 /// A field of which every value is one slot's ([`Join::Shared`]).
 struct Shared<'a, S> {
     plan: &'a FramePlan,
+    slots: &'a Slots,
     stored: PhantomData<S>,
 }
 
@@ -161,9 +212,8 @@ impl<S: Stored> Shared<'_, S> {
     /// The samples of a slot around a clamped position.
     #[inline]
     fn cell(&self, slot: u32, place: &Place, q: DVec3) -> Option<Cell> {
-        let slots = self.plan.field().slots();
-        let Some(samples) = slots.samples(slot) else {
-            return Some(Cell { samples: [slots.one_sample(slot)?; 8], fraction: DVec3::ZERO });
+        let Some(samples) = self.slots.samples(slot) else {
+            return Some(Cell { samples: [self.slots.one_sample(slot)?; 8], fraction: DVec3::ZERO });
         };
         let last = place.n_in_space() - 1;
         let s = place.local(q).clamp(DVec3::ZERO, last.as_dvec3());
@@ -182,6 +232,11 @@ impl<S: Stored> FieldReader for Shared<'_, S> {
     #[inline]
     fn plan(&self) -> &FramePlan {
         self.plan
+    }
+
+    #[inline]
+    fn slots(&self) -> &Slots {
+        self.slots
     }
 
     #[inline]
@@ -206,6 +261,10 @@ impl<S: Stored> FieldReader for Shared<'_, S> {
 
     fn jumps_between_levels(&self) -> bool {
         true
+    }
+
+    fn of_blocks(&self, patch: &Patch, _: DVec3, number: &dyn Fn(usize) -> f64) -> Option<f64> {
+        patch.slot.map(|(slot, _)| number(slot as usize))
     }
 }
 
@@ -236,6 +295,11 @@ impl<S: Stored> FieldReader for Blended<'_, S> {
         self.shared.plan
     }
 
+    #[inline]
+    fn slots(&self) -> &Slots {
+        self.shared.slots
+    }
+
     fn stored(&self, patch: &Patch, q: DVec3) -> Option<f64> {
         patch.slot.map(|_| self.blended(q, |_| ()))
     }
@@ -263,6 +327,68 @@ impl<S: Stored> FieldReader for Blended<'_, S> {
 
     fn jumps_between_levels(&self) -> bool {
         false
+    }
+
+    fn of_blocks(&self, patch: &Patch, q: DVec3, number: &dyn Fn(usize) -> f64) -> Option<f64> {
+        patch.slot?;
+        let level = |block| self.places.row(block).level;
+        let fetch = |block| number(self.places.layout().ordinal(block));
+        Some(interpolate(self.places.layout(), self.scheme, q.to_array(), level, fetch))
+    }
+}
+
+/// A field whose samples have spreads.
+struct Spread<'a, V, S> {
+    values: V,
+    spreads: S,
+    ranges: &'a BlockRanges,
+}
+
+impl<V: FieldReader, S: FieldReader> FieldReader for Spread<'_, V, S> {
+    #[inline]
+    fn plan(&self) -> &FramePlan {
+        self.values.plan()
+    }
+
+    #[inline]
+    fn slots(&self) -> &Slots {
+        self.values.slots()
+    }
+
+    #[inline]
+    fn spreads(&self) -> Option<&dyn FieldReader> {
+        Some(&self.spreads)
+    }
+
+    #[inline]
+    fn stored(&self, patch: &Patch, q: DVec3) -> Option<f64> {
+        self.values.stored(patch, q)
+    }
+
+    fn around(&self, patch: &Patch, q: DVec3) -> Option<Around> {
+        self.values.around(patch, q)
+    }
+
+    fn moved(&self, patch: &Patch, q: DVec3, delta: DVec3) -> f64 {
+        self.values.moved(patch, q, delta)
+    }
+
+    fn jumps_between_levels(&self) -> bool {
+        self.values.jumps_between_levels()
+    }
+
+    fn of_blocks(&self, patch: &Patch, q: DVec3, number: &dyn Fn(usize) -> f64) -> Option<f64> {
+        self.values.of_blocks(patch, q, number)
+    }
+
+    fn node(&self, patch: &Patch, q: DVec3) -> Option<Node> {
+        let (mean, deviation) = (self.values.value(patch, q)?, self.spreads.value(patch, q)?);
+        let (format, decode) = (self.slots().format(), self.slots().decode());
+        let value = |read: f32| decode.value(format.stored(read) / format.unit());
+        let [a, b] = [0, 1].map(|end| self.of_blocks(patch, q, &|block| value(self.ranges.reads()[block][end])));
+        // Of numbers that fall as values rise, the least stands for the greatest.
+        let range = ValueRange { min: a?.min(b?), max: a?.max(b?) };
+        Some(Node::Values(ValueSpread { mean, deviation, range }))
     }
 }
 

@@ -11,13 +11,13 @@ mod straying;
 mod walk;
 
 use brickfield_core::glam::{DVec3, UVec2};
-use brickfield_core::{Aabb, Image};
+use brickfield_core::{Aabb, Image, Optics};
 use brickfield_frame::{FramePlan, PlanRay};
-use brickfield_optics::{QuadratureRule, RayState, Segment};
+use brickfield_optics::{QuadratureRule, RayState, Segment, expected_optics};
 use rayon::prelude::*;
 
 use ambiguity::Ambiguity;
-use field::{FieldReader, Work, with_field};
+use field::{FieldReader, Node, Work, with_field};
 pub use rounding::{filter_rounding, position_rounding};
 use walk::{CutSegment, clip, parts};
 
@@ -106,11 +106,11 @@ fn along(field: &impl FieldReader, ray: &PlanRay) -> Pixel {
     let Some(span) = clip(ray, &relative(plan.domain(), plan.rays().center), ray.t_eye) else { return pixel };
     let mut state = RayState::default();
     for part in parts(plan, ray, span) {
-        let values = part_values(field, ray, part);
+        let nodes = part_nodes(field, ray, part);
         pixel.n_samples += plan.sampling().rule().nodes().len() as u64;
-        let segment = segment(plan, values, part.length);
+        let segment = segment(plan, nodes, part.length);
         if segment.depth > 0.0 {
-            pixel.n_visible_samples += n_visible(field, &values);
+            pixel.n_visible_samples += n_visible(field, &nodes);
             pixel.n_visible_segments += 1;
             state.push(segment);
         }
@@ -123,46 +123,56 @@ fn greatest_difference(a: &[f64; 4], b: &[f64; 4]) -> f64 {
     a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
 }
 
-/// The values at the nodes of a segment.
-fn part_values(field: &impl FieldReader, ray: &PlanRay, part: CutSegment) -> [Option<f64>; 2] {
-    node_values(field.plan().sampling().rule(), |x| {
+/// The nodes of a segment.
+fn part_nodes(field: &impl FieldReader, ray: &PlanRay, part: CutSegment) -> [Option<Node>; 2] {
+    rule_nodes(field.plan().sampling().rule(), |x| {
         let q = field.plan().rays().center + ray.at(part.at(x));
         match part.cell {
-            Some(cell) => field.value(&field.patch_of(cell), field.clamped(q)),
-            None => field.value_at(q),
+            Some(cell) => field.node(&field.patch_of(cell), field.clamped(q)),
+            None => field.node_at(q),
         }
     })
 }
 
-/// The values at a rule's nodes, `None` in empty blocks (and for the second node of a rule that has one).
-fn node_values(rule: QuadratureRule, at: impl Fn(f64) -> Option<f64>) -> [Option<f64>; 2] {
+/// A rule's nodes, `None` in empty blocks (and for the second node of a rule that has one).
+fn rule_nodes(rule: QuadratureRule, at: impl Fn(f64) -> Option<Node>) -> [Option<Node>; 2] {
     let nodes = rule.nodes();
     [at(nodes[0]), nodes.get(1).and_then(|x| at(*x))]
 }
 
-/// A segment whose nodes have the given values; `None`: extinction 0.
-fn segment(plan: &FramePlan, values: [Option<f64>; 2], length_world: f64) -> Segment {
-    let rule = plan.sampling().rule();
-    match (values, rule) {
-        ([None, None], _) => Segment::default(),
-        ([Some(a), Some(b)], _) => rule.segment(plan.transfer(), &[a, b], length_world),
-        ([Some(v), None] | [None, Some(v)], QuadratureRule::Gauss2) => one_gauss_node(plan, v, length_world),
-        (_, QuadratureRule::PreIntegrated) => Segment::default(),
-        ([Some(v), None] | [None, Some(v)], _) => rule.segment(plan.transfer(), &[v], length_world),
+/// The optics of a node (ARCHITECTURE.md, rule 5).
+fn optics(plan: &FramePlan, node: Node) -> Optics {
+    match node {
+        Node::Value(value) => plan.transfer().at(value),
+        Node::Values(values) => expected_optics(plan.transfer(), &values),
     }
 }
 
-/// A two-point Gauss segment whose other node has extinction 0: half the depth, all of the node's colour.
-fn one_gauss_node(plan: &FramePlan, value: f64, length_world: f64) -> Segment {
-    QuadratureRule::MidpointExponential.segment(plan.transfer(), &[value], 0.5 * length_world)
+/// A segment with the given nodes; `None`: extinction 0.
+fn segment(plan: &FramePlan, nodes: [Option<Node>; 2], length_world: f64) -> Segment {
+    let rule = plan.sampling().rule();
+    let of = |rule: QuadratureRule, nodes: &[Optics], length: f64| rule.segment_of(nodes, length).unwrap_or_default();
+    match (nodes, rule) {
+        ([None, None], _) => Segment::default(),
+        ([Some(a), Some(b)], QuadratureRule::PreIntegrated) => {
+            rule.segment(plan.transfer(), &[a.value(), b.value()], length_world)
+        }
+        (_, QuadratureRule::PreIntegrated) => Segment::default(),
+        ([Some(a), Some(b)], _) => of(rule, &[optics(plan, a), optics(plan, b)], length_world),
+        // The other node has extinction 0: half the depth, all of the node's colour.
+        ([Some(node), None] | [None, Some(node)], QuadratureRule::Gauss2) => {
+            of(QuadratureRule::MidpointExponential, &[optics(plan, node)], 0.5 * length_world)
+        }
+        ([Some(node), None] | [None, Some(node)], _) => of(rule, &[optics(plan, node)], length_world),
+    }
 }
 
 /// How many nodes of a visible segment have an extinction above 0.
-fn n_visible(field: &impl FieldReader, values: &[Option<f64>; 2]) -> u64 {
+fn n_visible(field: &impl FieldReader, nodes: &[Option<Node>; 2]) -> u64 {
     if field.plan().sampling().rule().nodes().len() == 1 {
         return 1;
     }
-    values.iter().flatten().filter(|v| field.plan().transfer().at(**v).extinction > 0.0).count() as u64
+    nodes.iter().flatten().filter(|node| optics(field.plan(), **node).extinction > 0.0).count() as u64
 }
 
 fn relative(b: &Aabb, center: DVec3) -> Aabb {

@@ -20,11 +20,11 @@
 use brickfield_core::TransferFunction;
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_frame::{FramePlan, SampleFormat};
-use brickfield_optics::transmittance;
+use brickfield_optics::{ValueSpread, transmittance};
 use rayon::prelude::*;
 
-use super::change::{Values, spread};
-use super::field::{Around, FieldReader, Patch, Work, with_field};
+use super::change::{Candidates, spread};
+use super::field::{FieldReader, Node, Patch, Work, with_field};
 use super::relative;
 use super::walk::{CutSegment, clip, parts};
 
@@ -77,14 +77,16 @@ fn of_pixel(field: &impl FieldReader, at: UVec2, cause: Cause) -> f64 {
     let ray = &plan.rays().ray(at.x, at.y);
     let Some(span) = clip(ray, &relative(plan.domain(), plan.rays().center), ray.t_eye) else { return 0.0 };
     let delta = plan.rays().rounding(at.x, at.y, ray, span.start.abs().max(span.end.abs())) / AT_WORST;
-    let stray = |patch: &Patch, q: DVec3, around: &Around| match cause {
-        Cause::Positions => field.gain() * field.moved(patch, q, delta),
-        Cause::Filter { sub_texel_bits } => filtered(field, field.gain() * around.widest, sub_texel_bits),
+    let stray = |reader: &dyn FieldReader, patch: &Patch, q: DVec3| match cause {
+        Cause::Positions => reader.gain() * reader.moved(patch, q, delta),
+        Cause::Filter { sub_texel_bits } => reader
+            .around(patch, q)
+            .map_or(0.0, |around| filtered(reader, reader.gain() * around.widest, sub_texel_bits)),
     };
     let (mut bound, mut least_depth) = (0.0, 0.0);
     for part in parts(plan, ray, span) {
-        let values = |x: &f64| values(field, part, plan.rays().center + ray.at(part.at(*x)), stray);
-        let nodes: Vec<Values> = plan.sampling().rule().nodes().iter().map(values).collect();
+        let candidates = |x: &f64| candidates_at(field, part, plan.rays().center + ray.at(part.at(*x)), stray);
+        let nodes: Vec<Candidates> = plan.sampling().rule().nodes().iter().map(candidates).collect();
         let (change, least) = spread(plan, &nodes, part);
         bound += transmittance(least_depth) * change;
         least_depth += least;
@@ -92,36 +94,45 @@ fn of_pixel(field: &impl FieldReader, at: UVec2, cause: Cause) -> f64 {
     SECOND_ORDER * bound
 }
 
-/// How far filtering may move a value between samples of a range, in data values.
-fn filtered(field: &impl FieldReader, range: f64, bits: u32) -> f64 {
+/// How far filtering may move a number between samples of a range, in data values.
+fn filtered(field: &dyn FieldReader, range: f64, bits: u32) -> f64 {
     let weights = 3.0 * (-f64::from(bits)).exp2() * range;
-    let by_code = field.plan().field().slots().format() == SampleFormat::Unorm8 && bits < f32::MANTISSA_DIGITS - 1;
+    let by_code = field.slots().format() == SampleFormat::Unorm8 && bits < f32::MANTISSA_DIGITS - 1;
     let code = if by_code { CODES * field.gain() } else { 0.0 };
     // Interpolation never leaves the cell's range by more than a code.
     (weights + code).min(range + code)
 }
 
-/// The values that a node at `q` may have; none where its block is empty. `stray` says how far the value may move, in data values.
-fn values(
+/// What a node at `q` may be; nothing where its block is empty. `stray` says how far a number may move, in data values.
+fn candidates_at(
     field: &impl FieldReader,
     part: CutSegment,
     q: DVec3,
-    stray: impl Fn(&Patch, DVec3, &Around) -> f64,
-) -> Values {
+    stray: impl Fn(&dyn FieldReader, &Patch, DVec3) -> f64,
+) -> Candidates {
     let q = field.clamped(q);
     let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(q)));
-    let (Some(value), Some(around)) = (field.value(&patch, q), field.around(&patch, q)) else {
-        return vec![None];
-    };
-    candidates(field.plan().transfer(), value, stray(&patch, q, &around))
+    let Some(node) = field.node(&patch, q) else { return vec![None] };
+    let means = extremes(field.plan().transfer(), node.value(), stray(field, &patch, q));
+    match (node, field.spreads()) {
+        (Node::Values(values), Some(spreads)) => {
+            let off = stray(spreads, &patch, q);
+            let deviations = [0.0, -off, off].map(|off| (values.deviation + off).max(0.0));
+            let of = |mean: &f64| {
+                deviations.map(|deviation| Some(Node::Values(ValueSpread { mean: *mean, deviation, ..values })))
+            };
+            means.iter().flat_map(of).collect()
+        }
+        _ => means.into_iter().map(|value| Some(Node::Value(value))).collect(),
+    }
 }
 
 /// The values at which extinction and colour are extreme: the node's own first, the ends, and both sides of knots between.
-fn candidates(transfer: &TransferFunction, value: f64, stray: f64) -> Values {
+fn extremes(transfer: &TransferFunction, value: f64, stray: f64) -> Vec<f64> {
     if stray == 0.0 {
-        return vec![Some(value)];
+        return vec![value];
     }
     let (low, high) = (value - stray, value + stray);
     let knots = transfer.knots().iter().map(|k| k.value).filter(|v| low <= *v && *v <= high);
-    [value, low, high].into_iter().chain(knots.flat_map(|v| [v.next_down(), v])).map(Some).collect()
+    [value, low, high].into_iter().chain(knots.flat_map(|v| [v.next_down(), v])).collect()
 }

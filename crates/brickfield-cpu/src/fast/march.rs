@@ -162,11 +162,21 @@ pub(super) fn one(
     k: i64,
     value: impl Fn(DVec3) -> Option<f32>,
 ) -> Segment32 {
-    let rule = plan.sampling().rule();
+    let (values, length) = nodes_of(plan, path, k, value);
+    segment(plan.sampling().rule(), transfer, values, length)
+}
+
+/// What a segment has at its nodes' sample positions, and the length that its light is computed for.
+pub(super) fn nodes_of<T>(
+    plan: &FramePlan,
+    path: &Path,
+    k: i64,
+    at: impl Fn(DVec3) -> Option<T>,
+) -> ([Option<T>; 2], f32) {
     let (start, length, weight) = path.segment(k);
-    let value = |x: &f64| value(plan.rays().center + path.ray.at(start + length * x));
-    let nodes = rule.nodes();
-    segment(rule, transfer, [value(&nodes[0]), nodes.get(1).and_then(value)], weight)
+    let at = |x: &f64| at(plan.rays().center + path.ray.at(start + length * x));
+    let nodes = plan.sampling().rule().nodes();
+    ([at(&nodes[0]), nodes.get(1).and_then(at)], weight)
 }
 
 /// All whole segments from `k` on whose nodes lie in the block of segment `k`'s first node; returns how many they are.

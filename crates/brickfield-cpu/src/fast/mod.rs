@@ -7,6 +7,7 @@ mod detail;
 mod f32_plan;
 mod march;
 mod placed;
+mod prefiltered;
 mod scalar;
 
 mod segment;
@@ -27,6 +28,7 @@ use brick::{Float32, Stored, Unorm8, Unorm16};
 use classify::Classifier;
 use f32_plan::F32Plan;
 use placed::PlacedPlan;
+use prefiltered::{Values32, expected};
 
 /// Most pixels along a side of a picture.
 const MAX_IMAGE: u32 = 1 << 16;
@@ -217,7 +219,7 @@ impl Work for Evaluation<'_> {
     }
 }
 
-fn evaluate(renderer: &impl Renderer, function: ShaderFunction, [x, y, z, _]: [f32; 4]) -> [f32; 4] {
+fn evaluate(renderer: &impl Renderer, function: ShaderFunction, [x, y, z, w]: [f32; 4]) -> [f32; 4] {
     let (plan, transfer) = (renderer.plan(), renderer.transfer());
     let values = transfer.values;
     let relative = |v: f32| values.number(v.into()) as f32;
@@ -225,7 +227,13 @@ fn evaluate(renderer: &impl Renderer, function: ShaderFunction, [x, y, z, _]: [f
         ShaderFunction::Alpha => [scalar::alpha(x), 0.0, 0.0, 0.0],
         ShaderFunction::Depth => [scalar::depth(x), 0.0, 0.0, 0.0],
         ShaderFunction::Classify => {
-            let o = transfer.at(relative(x));
+            let o = match plan.spreads() {
+                Some(_) => {
+                    let deviation = (f64::from(y) / values.unit()) as f32;
+                    expected(transfer, &Values32 { mean: relative(x), deviation, range: [relative(z), relative(w)] })
+                }
+                None => transfer.at(relative(x)),
+            };
             [o.color[0], o.color[1], o.color[2], o.extinction]
         }
         ShaderFunction::Segment => {

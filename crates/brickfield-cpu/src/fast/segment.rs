@@ -58,6 +58,16 @@ pub(super) fn segment(rule: QuadratureRule, transfer: &Classifier, values: [Opti
     }
 }
 
+/// A segment whose nodes have the given optics (`None`: extinction 0), by a rule that looks at nodes alone.
+pub(super) fn segment_of(rule: QuadratureRule, nodes: [Option<Optics32>; 2], length: f32) -> Segment32 {
+    match (rule, nodes) {
+        (QuadratureRule::Gauss2, [a, b]) => gauss2(a.unwrap_or_default(), b.unwrap_or_default(), length),
+        (QuadratureRule::LeftRiemann, [Some(o), _]) => euler(o, length),
+        (QuadratureRule::LeftExponential | QuadratureRule::MidpointExponential, [Some(o), _]) => exponential(o, length),
+        _ => Segment32::default(),
+    }
+}
+
 #[inline(always)]
 fn optics(transfer: &Classifier, value: Option<f32>) -> Optics32 {
     value.map_or(Optics32::default(), |v| transfer.at(v))

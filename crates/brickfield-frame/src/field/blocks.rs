@@ -4,7 +4,8 @@ use brickfield_core::glam::UVec3;
 use brickfield_core::{BlockLayout, Interblock, Level, Place};
 
 use super::SlotsError;
-use super::slots::check_inside;
+use super::slots::{PlaceTable, check_inside};
+use crate::Chunked;
 
 /// Flat blocks in a texture: for each block its level and its first texel, the rest is arithmetic (Ljung, Lundstroem and Ynnerman
 /// 2006, section 4, equation 12).
@@ -40,6 +41,37 @@ const TEXEL_BITS: [u32; 3] = [11, 11, 10];
 const LEVEL_BITS: u32 = 3;
 /// In a row's first word: the block is one sample.
 const ONE_SAMPLE: u32 = 1 << 31;
+
+/// The least and the greatest voxel of every block, as texture reads would return them: whatever its level is.
+#[derive(Clone, Debug)]
+pub struct BlockRanges {
+    reads: Vec<[f32; 2]>,
+    table: PlaceTable,
+}
+
+impl BlockRanges {
+    /// The ranges of blocks, by number.
+    pub fn new(reads: Vec<[f32; 2]>) -> BlockRanges {
+        BlockRanges { table: PlaceTable::new(bytemuck::cast_slice(&reads)), reads }
+    }
+
+    /// Least and greatest, by the blocks' numbers.
+    #[inline]
+    pub fn reads(&self) -> &[[f32; 2]] {
+        &self.reads
+    }
+
+    /// The same as shaders read it.
+    pub fn table(&self) -> &dyn Chunked {
+        &self.table
+    }
+}
+
+impl PartialEq for BlockRanges {
+    fn eq(&self, other: &BlockRanges) -> bool {
+        self.reads == other.reads
+    }
+}
 
 impl BlockPlaces {
     /// The blocks of a layout, by number, in a texture of so many texels.

@@ -18,7 +18,7 @@ use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, BlockLayout, Companion, Interblock, Level, Place};
 
 pub use atlas::{AtlasShape, Room, RoomChange, TextureShape};
-pub use blocks::{BlockPlaces, BlockRow, BlockSamples};
+pub use blocks::{BlockPlaces, BlockRanges, BlockRow, BlockSamples};
 pub use index::{IndexEntry, IndexGrid, IndexLattice, Reach};
 pub use packing::Packing;
 pub use slots::{Decode, Places, SampleFormat, Slots, SlotsError};
@@ -31,6 +31,7 @@ pub struct Field {
     slots: Arc<Slots>,
     join: Join,
     companions: Companions,
+    ranges: Option<Arc<BlockRanges>>,
 }
 
 /// The companions of a field's samples, by [`Companion`]; `None` where a frame needs none.
@@ -77,6 +78,8 @@ pub enum FieldError {
     BlendOfBricks,
     #[error("{companion} of other samples: they lie at the places of the field's")]
     OtherCompanions { companion: Companion },
+    #[error("ranges of {n_ranges} flat blocks, and {n_blocks} flat blocks")]
+    Ranges { n_ranges: usize, n_blocks: usize },
 }
 
 impl Field {
@@ -107,7 +110,7 @@ impl Field {
             _ if join != Join::Shared => return Err(FieldError::BlendOfBricks),
             _ => {}
         }
-        Ok(Field { dims, index, slots, join, companions: Companions::default() })
+        Ok(Field { dims, index, slots, join, companions: Companions::default(), ranges: None })
     }
 
     /// The field with companions of its samples.
@@ -122,15 +125,32 @@ impl Field {
         Ok(self)
     }
 
+    /// The field with the ranges of its flat blocks' voxels.
+    ///
+    /// # Errors
+    /// If not each flat block has one.
+    pub fn with_ranges(mut self, ranges: Arc<BlockRanges>) -> Result<Field, FieldError> {
+        let n_ranges = ranges.reads().len();
+        let n_blocks = match self.slots.places() {
+            Places::Blocks(places) => places.rows().len(),
+            Places::Even(_) | Places::Table { .. } => 0,
+        };
+        if n_ranges != n_blocks {
+            return Err(FieldError::Ranges { n_ranges, n_blocks });
+        }
+        self.ranges = Some(ranges);
+        Ok(self)
+    }
+
     /// A field of parts that may not fit.
     pub(crate) fn unchecked(
         dims: UVec3,
         index: Arc<IndexGrid>,
         slots: Arc<Slots>,
         join: Join,
-        companions: Companions,
+        (companions, ranges): (Companions, Option<Arc<BlockRanges>>),
     ) -> Field {
-        Field { dims, index, slots, join, companions }
+        Field { dims, index, slots, join, companions, ranges }
     }
 
     /// Samples of the volume along x, y, z, at level 0.
@@ -155,6 +175,12 @@ impl Field {
     #[inline]
     pub fn companions(&self, companion: Companion) -> Option<&Arc<Slots>> {
         self.companions[companion as usize].as_ref()
+    }
+
+    /// The ranges of flat blocks' voxels; `None` where the frame needs none.
+    #[inline]
+    pub fn ranges(&self) -> Option<&Arc<BlockRanges>> {
+        self.ranges.as_ref()
     }
 
     /// How a value between two slots comes about.

@@ -138,7 +138,7 @@ pub struct Slots {
 
 /// A table of places as shaders read it, in pages.
 #[derive(Clone, Debug)]
-struct PlaceTable {
+pub(super) struct PlaceTable {
     bytes: Vec<u8>,
     id: ContentId,
     pages: Vec<ContentId>,
@@ -426,7 +426,7 @@ impl Chunked for Slots {
 }
 
 impl PlaceTable {
-    fn new(bytes: &[u8]) -> PlaceTable {
+    pub(super) fn new(bytes: &[u8]) -> PlaceTable {
         let pages = (0..bytes.len().div_ceil(PAGE_BYTES)).map(|_| ContentId::new()).collect();
         PlaceTable { bytes: bytes.to_vec(), id: ContentId::new(), pages }
     }

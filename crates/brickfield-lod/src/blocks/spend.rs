@@ -13,6 +13,8 @@ pub struct BlockBudget {
     pub size: BudgetSize,
     /// The type that samples are stored in.
     pub scalar: ScalarType,
+    /// Bytes that each sample takes besides its value: those of its companions.
+    pub companion_bytes: u8,
     /// Whether a block of one sample takes bytes.
     pub one_sample: OneSampleBlocks,
 }
@@ -41,7 +43,7 @@ pub enum OneSampleBlocks {
 pub struct BlockSelection {
     /// A level for each block.
     pub levels: BlockLevels,
-    /// Bytes of the blocks' samples: never more than the budget.
+    /// Bytes of the blocks' samples and their companions: never more than the budget.
     pub n_bytes: u64,
     /// The sum over all blocks of weight times voxels times error.
     pub cost: f64,
@@ -194,7 +196,10 @@ impl<'a> Tariff<'a> {
     fn at(&self, level: Level) -> (u64, f64) {
         let n = self.layout.n_samples_total(self.layout.block(self.ordinal), level);
         let n = if n == 1 && self.budget.one_sample == OneSampleBlocks::Free { 0 } else { n };
-        (n * self.budget.scalar.n_bytes() as u64, self.costs[usize::from(level.0)])
+        (
+            n * (self.budget.scalar.n_bytes() as u64 + u64::from(self.budget.companion_bytes)),
+            self.costs[usize::from(level.0)],
+        )
     }
 
     /// The part of a step that gains most for at most so many bytes.

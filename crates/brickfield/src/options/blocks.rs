@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use brickfield_bricks::{BlockOptions, BlockSource, build_blocks};
-use brickfield_core::{BlockSide, TransferFunction, Volume};
+use brickfield_core::{BlockSide, Companion, TransferFunction, Volume};
 use brickfield_frame::Join;
 use brickfield_io::WorldFrame;
 use brickfield_lod::{
@@ -14,7 +14,7 @@ use brickfield_lod::{
 use clap::Args;
 
 use super::{InputOptions, OptionError, ViewOptions, values};
-use crate::{BlockStyle, Scene, TransparentBlocks};
+use crate::{BlockStyle, Classification, Scene, TransparentBlocks};
 
 /// Flat blocks instead of an octree.
 #[derive(Args, Clone, Debug)]
@@ -39,6 +39,9 @@ pub struct BlockArgs {
     /// Inside of transparent blocks: empty (as in the paper) or blended (as between others)
     #[arg(long, value_name = "HOW", requires = "blocks", default_value = "empty", value_parser = values::transparent_blocks)]
     pub transparent: TransparentBlocks,
+    /// Optics of coarse samples: mean (of the average) or prefiltered (the mean of those of its voxels, by a byte more for each sample)
+    #[arg(long, value_name = "HOW", requires = "blocks", default_value = "mean", value_parser = values::classification)]
+    pub classify: Classification,
     /// Choose levels by what the transfer function shows alone, whatever part of it the camera sees
     #[arg(long, requires = "blocks")]
     pub any_view: bool,
@@ -77,7 +80,7 @@ impl BlockSubject {
 impl BlockArgs {
     /// How blocks are drawn.
     pub fn style(&self) -> BlockStyle {
-        BlockStyle { join: self.between, transparent: self.transparent }
+        BlockStyle { join: self.between, transparent: self.transparent, classification: self.classify }
     }
 
     /// The level of each block: what the budget buys, or one for all.
@@ -104,7 +107,11 @@ impl BlockArgs {
         let errors = BlockErrors::estimate(&layout, source.summaries(), &scene.transfer, slab)?;
         let view = BlockView { view: scene.view(), clip: scene.clip, importance: Importance::default() };
         let weights = (!self.any_view).then(|| block_weights(&layout, source.grid(), &view));
-        let budget = BlockBudget { size, scalar, one_sample: OneSampleBlocks::Free };
+        let companion_bytes = match self.classify {
+            Classification::OfMean => 0,
+            Classification::Prefiltered => Companion::Spread.n_bytes() as u8,
+        };
+        let budget = BlockBudget { size, scalar, companion_bytes, one_sample: OneSampleBlocks::Free };
         Ok(select_block_levels(&layout, errors.levels(), weights.as_deref(), &budget)?)
     }
 }

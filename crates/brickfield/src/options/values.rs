@@ -10,7 +10,7 @@ use brickfield_lod::Criterion;
 use brickfield_optics::QuadratureRule;
 
 use super::{Background, Boxes};
-use crate::{MAX_IMAGE, Quality, TransparentBlocks};
+use crate::{Classification, MAX_IMAGE, Quality, TransparentBlocks};
 
 /// Pixels along a facet of tessellated shells where none are asked for.
 pub const FACET_PIXELS: u32 = 16;
@@ -93,6 +93,15 @@ pub fn transparent_blocks(text: &str) -> Result<TransparentBlocks, String> {
         "empty" => Ok(TransparentBlocks::Empty),
         "blended" => Ok(TransparentBlocks::Blended),
         _ => Err("empty or blended".to_owned()),
+    }
+}
+
+/// Which optics coarse samples have.
+pub fn classification(text: &str) -> Result<Classification, String> {
+    match text {
+        "mean" => Ok(Classification::OfMean),
+        "prefiltered" => Ok(Classification::Prefiltered),
+        _ => Err("mean or prefiltered".to_owned()),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use brickfield::frame::{Division, FramePlan, Join, Mode, Placement, Places, ShaderFunction, Target};
 use brickfield::interp::Neighbourhood;
-use brickfield::{BlockStyle, Technique, TransparentBlocks};
+use brickfield::{BlockStyle, Classification, Technique, TransparentBlocks};
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{BlockSide, Grid, Interblock, Level, ScalarType};
 use brickfield_optics::QuadratureRule;
@@ -16,16 +16,17 @@ use crate::conformance::shader_mutants as shader;
 use crate::volumes::spread;
 
 /// The scheme, with the inside of transparent blocks drawn as any other: the plan without skipping is the same field.
-fn blended(scheme: Interblock) -> BlockStyle {
-    BlockStyle { join: Join::Blend(scheme), transparent: TransparentBlocks::Blended }
+pub(super) fn blended(scheme: Interblock) -> BlockStyle {
+    BlockStyle { join: Join::Blend(scheme), transparent: TransparentBlocks::Blended, ..NEAREST }
 }
 
 /// Blocks of random resolutions, the last ones short.
-fn random(scalar: ScalarType, side: BlockSide, style: BlockStyle) -> Setup {
+pub(super) fn random(scalar: ScalarType, side: BlockSide, style: BlockStyle) -> Setup {
     Setup::new(hills(&grid(), scalar), soft(scalar)).blocks(side, FlatLevels::Random, style)
 }
 
-const NEAREST: BlockStyle = BlockStyle { join: Join::Shared, transparent: TransparentBlocks::Empty };
+pub(super) const NEAREST: BlockStyle =
+    BlockStyle { join: Join::Shared, transparent: TransparentBlocks::Empty, classification: Classification::OfMean };
 
 pub(super) fn cases() -> Vec<Case> {
     [pictures(), equal(), weights()].into_iter().flatten().collect()

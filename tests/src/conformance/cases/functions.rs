@@ -123,7 +123,7 @@ fn values(transfer: &TransferFunction) -> Vec<f32> {
 }
 
 /// Greatest extinction, and greatest change of extinction or colour per unit of value.
-fn steepness(transfer: &TransferFunction) -> (f64, f64) {
+pub(super) fn steepness(transfer: &TransferFunction) -> (f64, f64) {
     let most = transfer.knots().iter().map(|k| k.extinction).fold(0.0, f64::max);
     let slopes = transfer.knots().windows(2).filter(|k| k[1].value > k[0].value).map(|k| {
         let change = (0..3)

@@ -9,6 +9,7 @@ mod levels;
 mod pictures;
 mod placements;
 mod polygons;
+mod prefiltered;
 mod real;
 mod setup;
 mod storages;
@@ -28,6 +29,7 @@ pub fn all() -> Vec<Case> {
         fast::cases(),
         storages::cases(),
         blocks::cases(),
+        prefiltered::cases(),
         extremes::cases(),
         real::cases(),
     ]

@@ -1,10 +1,11 @@
 //! `brickfield render`.
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
 use brickfield::bricks::block_memory;
 use brickfield::core::{BlockSide, BrickId, Image, Level};
-use brickfield::frame::{Backend, Frame, FramePlan};
+use brickfield::frame::{Backend, Frame, FramePlan, Slots};
 use brickfield::lod::{BlockLevels, select_cut};
 use brickfield::options::{BlockSubject, Boxes, Subject, values};
 use brickfield::overlay::{LevelColor, show_bricks, show_bricks_faintly};
@@ -74,8 +75,10 @@ fn block_summary(subject: &BlockSubject, levels: &BlockLevels, residency: &Block
         .collect();
     let slots = plan.field().slots();
     let free = residency.n_free_texels() * slots.format().n_bytes() as u64;
+    let of_spreads = |spreads: &Arc<Slots>| format!(" and spreads of {:.1} MiB", mib(spreads.n_bytes() as u64));
+    let spreads = plan.spreads().map(of_spreads).unwrap_or_default();
     format!(
-        "flat blocks of {}: {}; {:.1}:1\nkept {:.1} MiB, {:.1} MiB of the texture free; with ghost layers {:.1} MiB (one side), {:.1} MiB (both)\n",
+        "flat blocks of {}: {}; {:.1}:1\nkept {:.1} MiB{spreads}, {:.1} MiB of the texture free; with ghost layers {:.1} MiB (one side), {:.1} MiB (both)\n",
         layout.side(),
         by_level.join(", "),
         memory.ratio(),
