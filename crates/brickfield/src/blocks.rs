@@ -260,6 +260,41 @@ mod tests {
     }
 
     #[test]
+    fn spreads_are_brought_where_they_change_something() {
+        let source = blocks(UVec3::new(20, 17, 9));
+        let (scene, mut residency) = (scene(&source), BlockResidency::default());
+        let style = BlockStyle { classification: Classification::Prefiltered, ..BLENDED };
+        let n_blocks = source.layout().n_blocks_total();
+        let mut has_spreads = |scene: &Scene, level| {
+            let plan = prepare_blocks(&source, scene, &vec![Level(level); n_blocks], style, &mut residency).unwrap();
+            assert_eq!(plan.spreads().is_some(), plan.field().companions(Companion::Spread).is_some());
+            plan.spreads().is_some()
+        };
+        assert!(has_spreads(&scene, 2) && has_spreads(&scene, 3) && !has_spreads(&scene, 0));
+        let fog = Scene { transfer: TransferFunction::constant(0.1, [1.0; 3]).unwrap(), ..scene.clone() };
+        assert!(!has_spreads(&fog, 2));
+        let refused = Scene { rule: QuadratureRule::PreIntegrated, ..scene };
+        let levels = vec![Level(0); n_blocks];
+        let error = prepare_blocks(&source, &refused, &levels, style, &mut residency).unwrap_err().to_string();
+        assert!(error.starts_with("spreads of samples with the rule pre-integrated"), "{error}");
+    }
+
+    #[test]
+    fn prefiltered_blocks_of_one_value_look_as_their_mean() {
+        let grid = Grid::axis_aligned(UVec3::new(20, 17, 9), DVec3::ONE).unwrap();
+        let volume = Arc::new(Volume::new(grid, vec![30_000u16; 20 * 17 * 9]).unwrap());
+        let source = build_blocks(volume, &BlockOptions { side: BlockSide::V8, ..BlockOptions::default() }).unwrap();
+        let mut backend = open_backend(BackendKind::Cpu, None, Validation::Off).unwrap();
+        let mut picture = |classification| {
+            let levels: Vec<Level> = (0..source.layout().n_blocks_total()).map(|i| Level(i as u8 % 4)).collect();
+            let style = BlockStyle { classification, ..BLENDED };
+            let plan = prepare_blocks(&source, &scene(&source), &levels, style, &mut BlockResidency::default());
+            backend.render(&plan.unwrap()).unwrap().image
+        };
+        assert_eq!(picture(Classification::OfMean), picture(Classification::Prefiltered));
+    }
+
+    #[test]
     fn levels_that_are_none_are_named() {
         let source = blocks(UVec3::new(20, 8, 8));
         let error = |levels: &[Level]| {

@@ -75,7 +75,7 @@ fn pictures() -> Vec<Case> {
                 setup.blocks(BlockSide::V8, FlatLevels::All(Level(3)), prefiltered(blended(MinimumDistance)))
             },
         ),
-        picture("prefiltered/jump", catches![shader::SPREADS_IGNORED, shader::LEFT_CONTINUOUS, KnotMoved], move || {
+        picture("prefiltered/jump", catches![shader::SPREADS_IGNORED, shader::HALVES_ALIKE, KnotMoved], move || {
             let knots = [knot(0.2, 0.0, WARM), knot(0.45, 0.02, WARM), knot(0.45, 0.15, COOL), knot(1.0, 0.05, COOL)];
             let transfer = spread(&knots, u16).expect("knots ascend");
             Setup::new(hills(&grid(), u16), transfer).blocks(BlockSide::V8, FlatLevels::Random, maximum())
