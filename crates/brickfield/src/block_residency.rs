@@ -60,9 +60,10 @@ enum Arrangement {
     Packed(Packing),
 }
 
-/// Texels along the sides of a texture, at most: every Vulkan device takes so many along x and y, and as many layers as rows tell
-/// apart.
+/// Texels along x and y of a texture, at most: every Vulkan device takes so many.
 const MAX_TEXELS: u32 = 2048;
+/// Texels that blocks of one level may take in their order: rows tell so many layers apart.
+const MOST_TEXELS: UVec3 = UVec3::new(MAX_TEXELS, MAX_TEXELS, 1024);
 /// Blocks are packed anew if their texture has this many times the cubes that they need, and a few more.
 const TOO_LARGE: u64 = 2;
 const FEW_CUBES: u64 = 8;
@@ -344,7 +345,7 @@ fn dense_texels(layout: &BlockLayout, levels: &[Level]) -> Option<(Level, UVec3)
     let level = *levels.first()?;
     let end = layout.n_blocks() - 1;
     let texels = end * (layout.side().n_voxels() >> level.0) + layout.n_samples(end, level);
-    let fits = level < layout.side().one_sample() && texels.max_element() <= MAX_TEXELS;
+    let fits = level < layout.side().one_sample() && texels.cmple(MOST_TEXELS).all();
     (fits && levels.iter().all(|other| *other == level)).then_some((level, texels))
 }
 
@@ -441,6 +442,16 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn blocks_of_one_level_that_are_too_high_for_a_texture_are_packed() {
+        let grid = Grid::axis_aligned(UVec3::new(8, 8, 1100), DVec3::ONE).unwrap();
+        let volume = Arc::new(Volume::new(grid, vec![1u8; 8 * 8 * 1100]).unwrap());
+        let source = build_blocks(volume, &BlockOptions { side: BlockSide::V8, ..BlockOptions::default() }).unwrap();
+        let levels = vec![Level(0); source.layout().n_blocks_total()];
+        let field = field(&mut BlockResidency::default(), &source, &levels, &[]);
+        assert_eq!(field.dense_level(), None);
     }
 
     /// Values alone, as of a store.
