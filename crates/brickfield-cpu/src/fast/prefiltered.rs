@@ -40,8 +40,8 @@ fn uniform(transfer: &Classifier, low: f32, high: f32) -> Means {
     let mut sum = Means::default();
     let mut add = |share: f32, a: Optics32, b: Optics32| {
         let (at_a, at_b) = (2.0 * a.extinction + b.extinction, a.extinction + 2.0 * b.extinction);
-        for c in 0..3 {
-            sum[c] += share * (1.0 / 6.0) * (at_a * a.color[c] + at_b * b.color[c]);
+        for (sum, (a, b)) in sum.iter_mut().zip(a.color.into_iter().zip(b.color)) {
+            *sum += share * (1.0 / 6.0) * (at_a * a + at_b * b);
         }
         sum[3] += share * 0.5 * (a.extinction + b.extinction);
     };
