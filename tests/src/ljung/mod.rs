@@ -4,18 +4,21 @@
 //! - `gradient`: figure 7, a rotated linear gradient at random resolutions. `weights`: figures 4 and 5, read back from backends.
 //! - `continuity`: jumps on faces, edges and corners; equal resolutions against trilinear interpolation.
 //! - `accounting`: figure 9. `table`: error, time, samples and bytes at several budgets. `cost`: schemes against the nearest block.
-//! - `rank`: estimated errors of blocks against exact ones. `reselect`: after an edit of the transfer function. `figures`: pictures.
+//! - `rank`: estimated errors of blocks against exact ones. `reselect`: after an edit of the transfer function. `store`: a volume on disk,
+//!   larger than its budget. `figures`: pictures.
 
 mod accounting;
 mod args;
 mod continuity;
 mod cost;
 mod data;
+mod error;
 mod figures;
 mod gradient;
 mod rank;
 mod reselect;
 mod schemes;
+mod store;
 mod table;
 mod weights;
 
@@ -38,6 +41,7 @@ pub fn ljung(args: &LjungArgs) -> Result<Findings, PaperError> {
         Part::Cost => cost::run(args, rivals),
         Part::Rank => rank::run(args),
         Part::Reselect => reselect::run(args),
+        Part::Store => store::run(args, rivals),
         Part::Figures => figures::run(args, rivals),
     })
 }

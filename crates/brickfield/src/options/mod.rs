@@ -5,19 +5,29 @@ pub mod values;
 
 use std::path::{Path, PathBuf};
 
+#[cfg(feature = "formats")]
+use brickfield_bricks::BlockSource;
 use brickfield_bricks::{BrickTree, BuildOptions, Downsampling, build_tree_observed};
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BlockSide, BrickSide, Grid, Level, LinearRgb, TransferFunction, Volume};
 use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
 use brickfield_io::{ChoiceKind, Limits, OpenError, OpenOptions, Opened, RawSpec, SliceSource, WorldFrame};
 use brickfield_lod::Criterion;
+#[cfg(feature = "formats")]
+use brickfield_optics::diagonal_world;
 use brickfield_optics::{NarrowPeak, Preset, QuadratureRule, narrow_peak};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-pub use blocks::{BlockArgs, BlockSubject};
+pub use blocks::{BlockArgs, BlockSubject, Blocks};
 
+#[cfg(feature = "formats")]
+use crate::StoreBlocks;
 use crate::{Quality, Scene, Skipping, Technique, Viewpoint};
+
+/// Most bytes of the coarse level of a store from which a transfer function is chosen.
+#[cfg(feature = "formats")]
+const OVERVIEW_BYTES: u64 = 16 << 20;
 
 /// How a file is read.
 #[derive(Args, Clone, Debug)]
@@ -348,6 +358,19 @@ impl ViewOptions {
         Ok(match self.named_transfer()? {
             NamedTransfer::Automatic => brickfield_optics::automatic(volume),
             NamedTransfer::Preset(preset) => preset.for_volume(volume)?,
+            NamedTransfer::OfFile(transfer) => transfer,
+        })
+    }
+
+    /// The transfer function that is asked for, for a volume that stays on disk.
+    ///
+    /// # Errors
+    /// As [`transfer`](Self::transfer); a store that has no level to choose one from.
+    #[cfg(feature = "formats")]
+    fn transfer_of_store(&self, store: &StoreBlocks) -> Result<TransferFunction, OptionError> {
+        Ok(match self.named_transfer()? {
+            NamedTransfer::Automatic => brickfield_optics::automatic(&store.overview(OVERVIEW_BYTES)?),
+            NamedTransfer::Preset(preset) => preset.transfer(store.range(), diagonal_world(store.grid()))?,
             NamedTransfer::OfFile(transfer) => transfer,
         })
     }

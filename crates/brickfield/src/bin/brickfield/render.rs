@@ -2,10 +2,14 @@
 
 use std::collections::HashSet;
 
+#[cfg(feature = "formats")]
+use brickfield::StoreBlocks;
 use brickfield::bricks::block_memory;
 use brickfield::core::{BlockSide, BrickId, Image, Level};
 use brickfield::frame::{Backend, Frame, FramePlan};
 use brickfield::lod::{BlockLevels, select_cut};
+#[cfg(feature = "formats")]
+use brickfield::options::Blocks;
 use brickfield::options::{BlockSubject, Boxes, Subject, values};
 use brickfield::overlay::{LevelColor, show_bricks, show_bricks_faintly};
 use brickfield::{
@@ -45,26 +49,31 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
 
 /// Renders flat blocks.
 fn render_blocks(args: &RenderArgs, side: BlockSide, backend: &mut dyn Backend) -> Result<(), Failure> {
-    let subject = BlockSubject::open(&args.file, &args.input, side, &args.view)?;
-    let grid = subject.source.grid();
-    let scene = args.view.scene_of(grid, subject.frame, &subject.transfer)?;
-    let scene = args.sampling.of(scene, subject.volume.as_deref())?;
+    let subject = args.flat.open(&args.file, &args.input, side, &args.view)?;
+    let source = subject.blocks.source();
+    let scene = args.view.scene_of(source.grid(), subject.frame, &subject.transfer)?;
+    let scene = args.sampling.of(scene, subject.blocks.volume())?;
     let selection = args.flat.select(&subject, &scene)?;
     let (levels, mut residency) = (&selection.levels, BlockResidency::default());
-    let plan = prepare_blocks(subject.source.as_ref(), &scene, levels.levels(), args.flat.style(), &mut residency)?;
+    let plan = prepare_blocks(source, &scene, levels.levels(), args.flat.style(), &mut residency)?;
     note_if_nothing_shows(&plan);
     let frame = backend.render(&plan)?;
     let attributes = attributes(args, backend, &scene, &plan);
     write_picture(&args.out, &frame.image, args.view.background.0, &attributes)?;
     print(&summary(backend, &scene, &plan, &frame))?;
     print(&block_summary(&subject, levels, &residency, &plan))?;
+    #[cfg(feature = "formats")]
+    if let Blocks::Store(store) = &subject.blocks {
+        print(&store_summary(store, frame.uploaded_bytes))?;
+    }
     check_validation(&backend.validation_messages())
 }
 
 /// The blocks of each level, and their bytes.
 fn block_summary(subject: &BlockSubject, levels: &BlockLevels, residency: &BlockResidency, plan: &FramePlan) -> String {
-    let layout = subject.source.layout();
-    let memory = block_memory(layout, subject.source.scalar_type(), levels.levels());
+    let source = subject.blocks.source();
+    let layout = source.layout();
+    let memory = block_memory(layout, source.scalar_type(), levels.levels());
     let by_level: Vec<String> = layout
         .side()
         .levels()
@@ -83,6 +92,22 @@ fn block_summary(subject: &BlockSubject, levels: &BlockLevels, residency: &Block
         mib(free),
         mib(memory.larger.single_sided_bytes),
         mib(memory.larger.double_sided_bytes),
+    )
+}
+
+/// The bytes that a store was asked for, that are held beside the blocks, and that went to the device.
+#[cfg(feature = "formats")]
+fn store_summary(store: &StoreBlocks, uploaded: u64) -> String {
+    let missing = match store.n_missing_chunks() {
+        0 => String::new(),
+        n => format!("; {n} chunks are not stored, and have the fill value"),
+    };
+    format!(
+        "read {:.1} MiB of the store{missing}\nkept beside the blocks: {:.1} MiB of unpacked chunks, {:.1} MiB of summaries\nuploaded {:.1} MiB\n",
+        mib(store.n_bytes_read()),
+        mib(store.n_bytes_kept()),
+        mib(store.n_summary_bytes()),
+        mib(uploaded),
     )
 }
 
