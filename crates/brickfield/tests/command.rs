@@ -179,6 +179,38 @@ fn criteria_are_listed_or_repeated() {
     assert!(!both.contains("error:"), "{both}");
 }
 
+#[test]
+#[cfg(feature = "formats")]
+fn a_store_is_drawn_like_the_file_by_the_parts_that_its_blocks_need() {
+    let place = WorkFolder::new();
+    assert_eq!(place.run("pack|a.nrrd|-o|a.zarr").status.code(), Some(0));
+    let picture = |file: &str, words: &str| {
+        let out = place.run(&format!("render|{file}|-o|b.png|{SMALL}|--blocks|8|{words}"));
+        assert_eq!(out.status.code(), Some(0), "{words}: {}", text(&out.stderr));
+        (image::open(place.path().join("b.png")).unwrap().to_rgb8().into_raw(), text(&out.stdout))
+    };
+    for words in ["--block-level|0", "--block-level|1|--transfer|ramp", "--ratio|8", "--transfer|viridis|--ratio|20"] {
+        let ((of_file, _), (of_store, said)) = (picture("a.nrrd", words), picture("a.zarr", words));
+        assert_eq!(of_file, of_store, "{words}");
+        assert!(said.contains("MiB of the store\nkept beside the blocks: "), "{said}");
+    }
+    // Chunks that are lost or damaged are named, and no picture is left.
+    std::fs::remove_file(place.path().join("b.png")).unwrap();
+    let chunk = place.path().join("a.zarr/0/c/0/0/0");
+    let whole = std::fs::read(&chunk).unwrap();
+    for content in [Some(&whole[..whole.len() / 2]), None] {
+        match content {
+            Some(content) => std::fs::write(&chunk, content).unwrap(),
+            None => std::fs::remove_file(&chunk).unwrap(),
+        }
+        let out = place.run(&format!("render|a.zarr|-o|b.png|{SMALL}|--blocks|8|--transfer|ramp"));
+        assert_eq!(out.status.code(), Some(1));
+        let said = text(&out.stderr);
+        assert!(said.contains("a.zarr: ") && said.contains("block (0, 0, 0) of level 0"), "{said}");
+        assert!(!place.path().join("b.png").exists());
+    }
+}
+
 const SMALL: &str = "--backend|cpu|--size|24x18";
 
 impl WorkFolder {

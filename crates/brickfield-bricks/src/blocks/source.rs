@@ -53,7 +53,7 @@ impl SourceId {
 
 /// The samples of a block that could not be fetched.
 #[derive(Debug, thiserror::Error)]
-#[error("block ({}, {}, {}) of level {} cannot be fetched", block.x, block.y, block.z, level.0)]
+#[error("block ({}, {}, {}) of level {} cannot be fetched: {cause}", block.x, block.y, block.z, level.0)]
 #[allow(missing_docs)]
 pub struct FetchError {
     pub block: UVec3,
