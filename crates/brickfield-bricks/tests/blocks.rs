@@ -271,7 +271,8 @@ fn what_does_not_exist_is_named() {
     let source = blocks(&noise(UVec3::new(20, 3, 1), ScalarType::U8, 0), BlockSide::V8);
     for (block, level) in [(UVec3::new(3, 0, 0), Level(0)), (UVec3::ZERO, Level(4))] {
         let error = source.fetch(block, level, &mut Vec::new()).unwrap_err();
-        let said = format!("block ({}, 0, 0) of level {} cannot be fetched: there are 3 x 1 x 1 blocks", block.x, level.0);
+        let said =
+            format!("block ({}, 0, 0) of level {} cannot be fetched: there are 3 x 1 x 1 blocks", block.x, level.0);
         assert!(error.to_string().starts_with(&said), "{error}");
         let cause = error.source().and_then(|cause| cause.downcast_ref::<NoSuchBlock>()).unwrap();
         assert_eq!(cause.to_string(), "there are 3 x 1 x 1 blocks, of levels 0 to 3");

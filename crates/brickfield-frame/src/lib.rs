@@ -33,7 +33,7 @@ pub use field::{
 pub use pass::Pass;
 pub use plan::{Drawing, FramePlan, PlanError, PlanParts};
 pub use probe::{Fetch, Probe, ProbeUniforms, TextureReads, TextureWork};
-pub use proxy::{ProxyCorner, ProxyGeometry, Target};
+pub use proxy::{ProxyCorner, ProxyGeometry, Slices, Target};
 pub use rays::{PlanRay, RayFrame};
 pub use resource::{Content, Resource};
 pub use sampling::{Division, Lengths, Mode, Sampling, SamplingError};

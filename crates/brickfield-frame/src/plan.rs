@@ -7,7 +7,7 @@ use brickfield_core::{Aabb, TransferFunction};
 
 use crate::{
     Beams, DarkRegions, Division, Feature, FeatureSet, Field, Mode, Occupancy, Placement, ProxyGeometry, RayFrame,
-    SampleFormat, Sampling, Target, ValueScale,
+    SampleFormat, Sampling, Slices, Target, ValueScale,
 };
 
 /// Everything that a backend needs for one frame, and nothing that this frame does not need.
@@ -74,6 +74,8 @@ pub enum Drawing {
         back_to_front: Vec<UVec3>,
         /// The pixel format that they are blended into.
         target: Target,
+        /// The order of a polygon's fragments.
+        slices: Slices,
     },
 }
 
@@ -118,10 +120,10 @@ impl FramePlan {
         };
         match drawing {
             Drawing::Rays => plan.beams = dark.overview().and_then(|o| Beams::of(&plan, o)).map(Arc::new),
-            Drawing::Polygons { back_to_front, target } => {
+            Drawing::Polygons { back_to_front, target, slices } => {
                 // The interior of bricks is not looked at before it is drawn.
                 plan.occupancy = None;
-                plan.proxy = Some(Arc::new(ProxyGeometry::of(&plan, &back_to_front, target)));
+                plan.proxy = Some(Arc::new(ProxyGeometry::of(&plan, &back_to_front, target, slices)));
             }
         }
         plan.features = plan.needs();

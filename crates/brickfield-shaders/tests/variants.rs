@@ -3,7 +3,9 @@
 use std::collections::HashSet;
 
 use brickfield_core::Interblock;
-use brickfield_frame::{Division, Feature, FeatureSet, Fetch, Join, Lengths, QuadratureRule, Resource, ShaderFunction};
+use brickfield_frame::{
+    Division, Feature, FeatureSet, Fetch, Join, Lengths, QuadratureRule, Resource, ShaderFunction, Slices,
+};
 use brickfield_shaders::{
     BindingKind, Entry, FieldKind, KnotSearch, Segments, ShaderError, ShaderLibrary, Specialised, Surfaces, Variant,
     specialise,
@@ -48,9 +50,11 @@ fn variant(options: &[usize; N_OPTIONS]) -> Option<Variant> {
     let Segments { surfaces, division, lengths } = variant.segments;
     let is_nominal = lengths == Lengths::Nominal;
     let is_drawn = surfaces != Surfaces::Shells && division == Division::Brick && !variant.long_rays;
+    let is_blended = matches!(variant.field, FieldKind::Blocks(Join::Blend(_)));
     let is_of_blocks = matches!(variant.field, FieldKind::Blocks(_) | FieldKind::Dense);
     let is_asked_for = (!is_nominal || variant.rule == QuadratureRule::MidpointExponential)
-        && (variant.entry != Entry::Proxy || is_drawn)
+        && (!matches!(variant.entry, Entry::Proxy(_)) || is_drawn)
+        && (variant.entry != Entry::Proxy(Slices::InteriorsFirst) || is_blended)
         && (variant.field == FieldKind::Bricks || !features.contains(Feature::SkipMacrocells))
         && (is_of_blocks || !features.contains(Feature::ShortBlocks));
     is_asked_for.then_some(variant)
@@ -106,7 +110,7 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
                 assert_eq!(uses(Resource::Blocks), uses(Resource::Index) && is_of_blocks);
                 assert!(!reads || uses(Resource::Atlas));
             }
-            Entry::Proxy => {
+            Entry::Proxy(_) => {
                 assert_eq!(shader.module.entry_points.len(), 2);
                 let of_rays = [Resource::Index, Resource::Picture, Resource::SeenBefore, Resource::Beams];
                 assert!(!of_rays.into_iter().any(uses), "{:?}", resources(&shader));

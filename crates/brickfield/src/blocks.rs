@@ -3,7 +3,7 @@
 use brickfield_bricks::{BlockSource, FetchError};
 use brickfield_core::glam::UVec3;
 use brickfield_core::{Aabb, BlockLayout, BlockSide, Level, Projection, TransferFunction, ValueRange};
-use brickfield_frame::{Drawing, FramePlan, IndexEntry, Join, PlanError, PlanParts};
+use brickfield_frame::{Drawing, FramePlan, IndexEntry, Join, PlanError, PlanParts, Slices};
 use rayon::prelude::*;
 
 use crate::course::{Course, segment_reach, to_sample_space};
@@ -17,6 +17,8 @@ pub struct BlockStyle {
     pub join: Join,
     /// What is drawn inside blocks that are transparent.
     pub transparent: TransparentBlocks,
+    /// The order of a polygon's fragments, where polygons are drawn.
+    pub slices: Slices,
 }
 
 /// What is drawn inside a block all of whose voxels are transparent, next to one that is not.
@@ -77,7 +79,7 @@ pub fn prepare_blocks(
     let drawing = match scene.technique {
         Technique::RayCasting => Drawing::Rays,
         Technique::Polygons(target) => {
-            Drawing::Polygons { back_to_front: back_to_front(source, scene, &drawn), target }
+            Drawing::Polygons { back_to_front: back_to_front(source, scene, &drawn), target, slices: style.slices }
         }
     };
     let field = residency.field(source, drawn, style.join);
@@ -185,8 +187,11 @@ mod tests {
     use super::*;
     use crate::{BackendKind, Validation, open_backend};
 
-    const BLENDED: BlockStyle =
-        BlockStyle { join: Join::Blend(Interblock::MaximumDistance), transparent: TransparentBlocks::Empty };
+    const BLENDED: BlockStyle = BlockStyle {
+        join: Join::Blend(Interblock::MaximumDistance),
+        transparent: TransparentBlocks::Empty,
+        slices: Slices::Together,
+    };
 
     fn blocks(dims: UVec3) -> BlockVolume {
         let grid = Grid::axis_aligned(dims, DVec3::ONE).unwrap();

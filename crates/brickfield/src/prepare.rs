@@ -5,7 +5,7 @@ use brickfield_core::glam::{UVec2, UVec3};
 use brickfield_core::{Aabb, BrickId, BrickLayout, Level, ValueRange};
 use brickfield_frame::{
     DarkRegions, Drawing, FramePlan, IndexEntry, Placement, PlacementError, PlanError, PlanParts, RayFrame,
-    SamplingError,
+    SamplingError, Slices,
 };
 use brickfield_lod::{Selection, back_to_front, select_cut};
 
@@ -120,7 +120,11 @@ fn plan_selection(
         Technique::RayCasting => Drawing::Rays,
         Technique::Polygons(target) => {
             check_polygons(tree, &rays, sampling.step_world(), resident.len())?;
-            Drawing::Polygons { back_to_front: from_back_to_front(tree, scene, &resident), target }
+            Drawing::Polygons {
+                back_to_front: from_back_to_front(tree, scene, &resident),
+                target,
+                slices: Slices::Together,
+            }
         }
     };
     let field = residency.hold(tree, resident);

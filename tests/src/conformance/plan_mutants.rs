@@ -79,13 +79,15 @@ pub enum PlanMutant {
     ExitsMissing,
     /// Of three stacks of planes, the stack across z is missing.
     StackMissing,
+    /// Of flat blocks only what lies among their own samples is drawn, not what lies between blocks.
+    BetweenMissing,
     /// The picture of all earlier batches is forgotten when the last batch begins.
     BatchesForgotten,
 }
 
 impl PlanMutant {
     /// All plan mutants.
-    pub const ALL: [PlanMutant; 34] = [
+    pub const ALL: [PlanMutant; 35] = [
         PlanMutant::AnchorHalfVoxel,
         PlanMutant::PixelCorner,
         PlanMutant::RowsFlipped,
@@ -119,6 +121,7 @@ impl PlanMutant {
         PlanMutant::PolygonsMissing,
         PlanMutant::ExitsMissing,
         PlanMutant::StackMissing,
+        PlanMutant::BetweenMissing,
         PlanMutant::BatchesForgotten,
     ];
 
@@ -158,14 +161,20 @@ impl PlanMutant {
             PlanMutant::PolygonsMissing => "plan/polygons-missing",
             PlanMutant::ExitsMissing => "plan/exits-missing",
             PlanMutant::StackMissing => "plan/stack-missing",
+            PlanMutant::BetweenMissing => "plan/between-missing",
             PlanMutant::BatchesForgotten => "plan/batches-forgotten",
         }
     }
 
     /// Whether it is in the polygons, which only backends with a rasteriser draw.
     pub fn is_of_polygons(self) -> bool {
-        use PlanMutant::{BatchesForgotten, ExitsMissing, PolygonsMissing, PolygonsReversed, StackMissing};
-        matches!(self, PolygonsReversed | PolygonsMissing | ExitsMissing | StackMissing | BatchesForgotten)
+        use PlanMutant::{
+            BatchesForgotten, BetweenMissing, ExitsMissing, PolygonsMissing, PolygonsReversed, StackMissing,
+        };
+        matches!(
+            self,
+            PolygonsReversed | PolygonsMissing | ExitsMissing | StackMissing | BetweenMissing | BatchesForgotten
+        )
     }
 
     /// The plan with this thing wrong.
@@ -220,6 +229,7 @@ impl PlanMutant {
             }),
             PlanMutant::ExitsMissing => drop_triangles(plan, |corner| corner.surface == ProxyCorner::EXIT),
             PlanMutant::StackMissing => drop_triangles(plan, |corner| corner.owner / 2 == 2),
+            PlanMutant::BetweenMissing => drop_triangles(plan, |corner| corner.brick % 2 == 1),
             PlanMutant::BatchesForgotten => forget_batches(plan),
         }
     }

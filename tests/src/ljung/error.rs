@@ -25,3 +25,10 @@ impl Error {
         })
     }
 }
+
+impl std::fmt::Display for Error {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Error { rmse, delta_e_mean, delta_e_95 } = self;
+        write!(f, "RMSE {rmse:.2e}, dE mean {delta_e_mean:.3}, 95 % {delta_e_95:.2}")
+    }
+}

@@ -190,7 +190,7 @@ impl std::fmt::Display for StoreRow {
             f,
             "{}: {:.0} MiB of voxels, {} MiB on host and device; blocks of levels from 0: {:?}\n  voxels on the host {:.1} MiB, on the device {:.1} MiB; \
              summaries {:.1} MiB; {memory}\n  read {:.1} MiB, uploaded {:.1} MiB\n  the part of {PART}^3 voxels around the block with the greatest error: \
-             RMSE {:.2e}, dE mean {:.3}, 95 % {:.2}",
+             {}",
             self.backend,
             mib(self.voxel_bytes),
             self.budget_bytes >> 20,
@@ -200,9 +200,7 @@ impl std::fmt::Display for StoreRow {
             mib(self.summary_bytes),
             mib(self.read_bytes),
             mib(self.uploaded_bytes),
-            self.part.rmse,
-            self.part.delta_e_mean,
-            self.part.delta_e_95,
+            self.part,
         )
     }
 }

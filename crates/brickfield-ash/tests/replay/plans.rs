@@ -6,8 +6,8 @@ use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BrickSide, Camera, Grid, Knot, Level, Projection, TransferFunction};
 use brickfield_frame::{
     DarkRegions, Decode, Division, Drawing, FeatureSet, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join,
-    Mode, Placement, PlanParts, QuadratureRule, RayFrame, Reach, SampleFormat, Sampling, Slots, SpoiltPlan, Steps,
-    Target,
+    Mode, Placement, PlanParts, QuadratureRule, RayFrame, Reach, SampleFormat, Sampling, Slices, Slots, SpoiltPlan,
+    Steps, Target,
 };
 
 const N: u32 = 16;
@@ -91,7 +91,7 @@ pub(crate) fn polygons(plan: &FramePlan, placement: Placement, target: Target) -
     let sampling = plan.sampling().divided(Division::Brick);
     let rays = rays(&Steps::of(&sampling, placement, Level(0)).unwrap());
     let beside_each_other = vec![UVec3::ZERO, UVec3::X];
-    let drawing = Drawing::Polygons { back_to_front: beside_each_other, target };
+    let drawing = Drawing::Polygons { back_to_front: beside_each_other, target, slices: Slices::Together };
     FramePlan::new(PlanParts { rays, sampling, drawing, ..parts(plan) }).unwrap()
 }
 

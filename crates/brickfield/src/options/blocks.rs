@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use brickfield_bricks::{BlockOptions, BlockSource, BlockVolume, build_blocks};
 use brickfield_core::{BlockSide, TransferFunction, Volume};
-use brickfield_frame::Join;
+use brickfield_frame::{Join, Slices};
 use brickfield_io::WorldFrame;
 use brickfield_lod::{
     BlockBudget, BlockErrors, BlockLevels, BlockSelection, BlockView, BudgetSize, Importance, OneSampleBlocks, Slab,
@@ -44,6 +44,10 @@ pub struct BlockArgs {
     /// Inside of transparent blocks: empty (as in the paper) or blended (as between others)
     #[arg(long, value_name = "HOW", requires = "blocks", default_value = "empty", value_parser = values::transparent_blocks)]
     pub transparent: TransparentBlocks,
+    /// With --polygons: together, or interiors-first (each polygon twice, first among the block's own samples, then between blocks, as in
+    /// the paper: the same picture)
+    #[arg(long, value_name = "ORDER", requires_all = ["blocks", "polygons"], default_value = "together", value_parser = values::slices)]
+    pub slices: Slices,
     /// Choose levels by what the transfer function shows alone, whatever part of it the camera sees
     #[arg(long, requires = "blocks")]
     pub any_view: bool,
@@ -138,7 +142,7 @@ impl BlockArgs {
 
     /// How blocks are drawn.
     pub fn style(&self) -> BlockStyle {
-        BlockStyle { join: self.between, transparent: self.transparent }
+        BlockStyle { join: self.between, transparent: self.transparent, slices: self.slices }
     }
 
     /// The level of each block: what the budget buys, or one for all.

@@ -4,7 +4,7 @@
 use brickfield_bricks::Downsampling;
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Aabb, BlockSide, BrickSide, Interblock, Level, ScalarType, WorldPos};
-use brickfield_frame::{Division, Join, Lengths, Mode, Placement, Target};
+use brickfield_frame::{Division, Join, Lengths, Mode, Placement, Slices, Target};
 use brickfield_io::{ByteOrder, RawSpec};
 use brickfield_lod::Criterion;
 use brickfield_optics::QuadratureRule;
@@ -93,6 +93,15 @@ pub fn transparent_blocks(text: &str) -> Result<TransparentBlocks, String> {
         "empty" => Ok(TransparentBlocks::Empty),
         "blended" => Ok(TransparentBlocks::Blended),
         _ => Err("empty or blended".to_owned()),
+    }
+}
+
+/// The order of a polygon's fragments.
+pub fn slices(text: &str) -> Result<Slices, String> {
+    match text {
+        "together" => Ok(Slices::Together),
+        "interiors-first" => Ok(Slices::InteriorsFirst),
+        _ => Err("together or interiors-first".to_owned()),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Flat blocks of any resolution next to each other, and the values between them (Ljung, Lundstroem and Ynnerman 2006).
 
-use brickfield::frame::{Division, FramePlan, Join, Mode, Placement, Places, ShaderFunction, Target};
+use brickfield::frame::{Division, FramePlan, Join, Mode, Placement, Places, ShaderFunction, Slices, Target};
 use brickfield::interp::Neighbourhood;
 use brickfield::{BlockStyle, Technique, TransparentBlocks};
 use brickfield_core::glam::{DVec3, UVec3};
@@ -17,7 +17,7 @@ use crate::volumes::spread;
 
 /// The scheme, with the inside of transparent blocks drawn as any other: the plan without skipping is the same field.
 fn blended(scheme: Interblock) -> BlockStyle {
-    BlockStyle { join: Join::Blend(scheme), transparent: TransparentBlocks::Blended }
+    BlockStyle { join: Join::Blend(scheme), transparent: TransparentBlocks::Blended, slices: Slices::Together }
 }
 
 /// Blocks of random resolutions, the last ones short.
@@ -25,7 +25,8 @@ fn random(scalar: ScalarType, side: BlockSide, style: BlockStyle) -> Setup {
     Setup::new(hills(&grid(), scalar), soft(scalar)).blocks(side, FlatLevels::Random, style)
 }
 
-const NEAREST: BlockStyle = BlockStyle { join: Join::Shared, transparent: TransparentBlocks::Empty };
+const NEAREST: BlockStyle =
+    BlockStyle { join: Join::Shared, transparent: TransparentBlocks::Empty, slices: Slices::Together };
 
 pub(super) fn cases() -> Vec<Case> {
     [pictures(), equal(), weights()].into_iter().flatten().collect()
@@ -74,12 +75,16 @@ fn pictures() -> Vec<Case> {
                 (s.division, s.placement) = (Division::Brick, Placement::ViewportPlanes);
             })
         }),
-        picture("blocks/polygons", catches![shader::MAXIMUM_TO_THE_FACE, PolygonsReversed], move || {
-            random(u8, BlockSide::V16, blended(MaximumDistance)).with(|s| {
-                (s.division, s.placement) = (Division::Brick, Placement::ObjectPlanes);
-                s.technique = Technique::Polygons(Target::Float32);
-            })
-        }),
+        picture(
+            "blocks/polygons",
+            catches![shader::MAXIMUM_TO_THE_FACE, PolygonsReversed, BetweenMissing],
+            move || {
+                random(u8, BlockSide::V16, blended(MaximumDistance)).with(|s| {
+                    (s.division, s.placement) = (Division::Brick, Placement::ObjectPlanes);
+                    s.technique = Technique::Polygons(Target::Float32);
+                })
+            },
+        ),
         picture("blocks/all-of-level-2", catches![shader::NEAREST, DecodeOffset], move || {
             Setup::new(hills(&grid(), u16), soft(u16)).blocks(
                 BlockSide::V8,
