@@ -16,7 +16,7 @@ use crate::pack::finite_for;
 /// How much memory a store may take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StoreLimits {
-    /// Most bytes of unpacked chunks that are kept.
+    /// Most bytes of unpacked chunks that are kept; of one that is larger, its own.
     pub cache_bytes: u64,
     /// Most bytes of the summaries of all blocks, and most bytes of one unpacked chunk.
     pub max_bytes: u64,

@@ -20,6 +20,7 @@ mod reselect;
 mod schemes;
 mod store;
 mod table;
+mod warped;
 mod weights;
 
 pub use args::{LjungArgs, Part};
