@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use brickfield_core::glam::{UVec2, UVec3};
 use brickfield_core::{Aabb, TransferFunction};
+use brickfield_optics::LightSource;
 
 use crate::{
-    Beams, DarkRegions, Division, Feature, FeatureSet, Field, Mode, Occupancy, Placement, ProxyGeometry, RayFrame,
+    Beams, DarkRegions, Division, Feature, FeatureSet, Field, Lighting, Mode, Occupancy, Placement, ProxyGeometry, RayFrame,
     SampleFormat, Sampling, Target, ValueScale,
 };
 
@@ -22,6 +23,7 @@ pub struct FramePlan {
     pub(crate) visible: Aabb,
     pub(crate) sampling: Sampling,
     pub(crate) transfer: TransferFunction,
+    pub(crate) lighting: Option<Lighting>,
     pub(crate) occupancy: Option<Arc<Occupancy>>,
     pub(crate) beams: Option<Arc<Beams>>,
     pub(crate) proxy: Option<Arc<ProxyGeometry>>,
@@ -41,6 +43,8 @@ pub struct PlanParts {
     pub sampling: Sampling,
     /// Extinction per world unit and colour over data values.
     pub transfer: TransferFunction,
+    /// The light on surfaces; by default none.
+    pub lighting: Option<Lighting>,
     /// The regions that rays leave out; by default none.
     pub dark: DarkRegions,
     /// How backends that can do both make the picture.
@@ -56,8 +60,8 @@ impl PlanParts {
         sampling: Sampling,
         transfer: TransferFunction,
     ) -> PlanParts {
-        let (dark, drawing) = (DarkRegions::default(), Drawing::Rays);
-        PlanParts { field, rays, domain, sampling, transfer, dark, drawing }
+        let (lighting, dark, drawing) = (None, DarkRegions::default(), Drawing::Rays);
+        PlanParts { field, rays, domain, sampling, transfer, lighting, dark, drawing }
     }
 }
 
@@ -102,7 +106,7 @@ impl FramePlan {
     /// are not resident.
     pub fn new(parts: PlanParts) -> Result<FramePlan, PlanError> {
         check(&parts)?;
-        let PlanParts { field, rays, domain, sampling, transfer, dark, drawing } = parts;
+        let PlanParts { field, rays, domain, sampling, transfer, lighting, dark, drawing } = parts;
         let visible = visible_box(&field, &domain);
         let mut plan = FramePlan {
             field,
@@ -111,6 +115,7 @@ impl FramePlan {
             visible,
             sampling,
             transfer,
+            lighting,
             occupancy: dark.occupancy().cloned(),
             beams: None,
             proxy: None,
@@ -146,7 +151,10 @@ impl FramePlan {
             (Feature::SkipBesideBeams, self.beams.is_some()),
             (Feature::MultiLevel, self.field.has_coarse()),
             (Feature::ShortBlocks, self.field.has_short_blocks()),
-            (Feature::TransferLookup, self.transfer.knots().len() > 1),
+            // A value is looked up, and its gradient.
+            (Feature::TransferLookup, self.transfer.knots().len() > 1 || self.lighting.is_some()),
+            (Feature::Light, self.lighting.is_some()),
+            (Feature::LightBesideEye, self.lighting.is_some_and(|l| l.light.source() != LightSource::Head)),
         ];
         needed.into_iter().filter_map(|(feature, is_needed)| is_needed.then_some(feature)).collect()
     }
@@ -185,6 +193,12 @@ impl FramePlan {
     #[inline]
     pub fn transfer(&self) -> &TransferFunction {
         &self.transfer
+    }
+
+    /// The light on surfaces; `None` where the medium only emits.
+    #[inline]
+    pub fn lighting(&self) -> Option<&Lighting> {
+        self.lighting.as_ref()
     }
 
     /// Which macrocells of bricks are dark; `None` where nothing inside a brick is leapt over.

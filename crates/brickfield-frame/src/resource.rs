@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use crate::{Chunked, FramePlan, KnotUniform, Slots};
+use crate::{Chunked, FramePlan, KnotUniform, LightUniform, Slots};
 
 /// A buffer, texture or sampler, by the name that it has in shaders (`frame.wesl`).
 ///
@@ -25,6 +25,8 @@ pub enum Resource {
     Blocks,
     /// The transfer function's knots.
     Knots,
+    /// The light on surfaces ([`LightUniform`]).
+    Light,
     /// The picture that rays are stored to.
     Picture,
     /// The inputs of an evaluated function.
@@ -59,7 +61,7 @@ pub enum Content<'a> {
 
 impl Resource {
     /// All resources.
-    pub const ALL: [Resource; 17] = [
+    pub const ALL: [Resource; 18] = [
         Resource::Frame,
         Resource::Atlas,
         Resource::AtlasSampler,
@@ -67,6 +69,7 @@ impl Resource {
         Resource::Places,
         Resource::Blocks,
         Resource::Knots,
+        Resource::Light,
         Resource::Picture,
         Resource::Inputs,
         Resource::Outputs,
@@ -89,6 +92,7 @@ impl Resource {
             Resource::Places => "places",
             Resource::Blocks => "blocks",
             Resource::Knots => "knots",
+            Resource::Light => "light",
             Resource::Picture => "picture",
             Resource::Inputs => "inputs",
             Resource::Outputs => "outputs",
@@ -119,6 +123,7 @@ impl FramePlan {
             Resource::Places => self.field.slots().place_table().map(Content::Chunks),
             Resource::Blocks => self.field.slots().block_table().map(Content::Chunks),
             Resource::Knots => bytes(bytemuck::cast_slice(&KnotUniform::of(self))),
+            Resource::Light => LightUniform::of(self).and_then(|light| bytes(bytemuck::bytes_of(&light))),
             Resource::Occupancy => self.occupancy.as_ref().map(|occupancy| Content::Chunks(&**occupancy)),
             Resource::Beams => self.beams.as_ref().and_then(|beams| bytes(bytemuck::cast_slice(&beams.spans()))),
             Resource::Drawn => {

@@ -6,7 +6,7 @@ use brickfield_core::glam::UVec3;
 use brickfield_core::{Aabb, TransferFunction};
 
 use crate::{
-    Beams, Feature, FeatureSet, Field, FramePlan, IndexGrid, Join, Occupancy, Overview, ProxyGeometry, RayFrame,
+    Beams, Feature, FeatureSet, Field, FramePlan, IndexGrid, Join, Lighting, Occupancy, Overview, ProxyGeometry, RayFrame,
     Sampling, Slots,
 };
 
@@ -23,6 +23,7 @@ pub struct SpoiltPlan {
     pub visible: Aabb,
     pub sampling: Sampling,
     pub transfer: TransferFunction,
+    pub lighting: Option<Lighting>,
     pub occupancy: Option<Arc<Occupancy>>,
     pub proxy: Option<Arc<ProxyGeometry>>,
     pub features: FeatureSet,
@@ -32,7 +33,7 @@ pub struct SpoiltPlan {
 impl SpoiltPlan {
     /// The parts of a plan.
     pub fn of(plan: &FramePlan) -> SpoiltPlan {
-        let FramePlan { field, rays, domain, visible, sampling, transfer, occupancy, beams, proxy, features } =
+        let FramePlan { field, rays, domain, visible, sampling, transfer, lighting, occupancy, beams, proxy, features } =
             plan.clone();
         SpoiltPlan {
             dims: field.dims(),
@@ -44,6 +45,7 @@ impl SpoiltPlan {
             visible,
             sampling,
             transfer,
+            lighting,
             occupancy,
             proxy,
             features,
@@ -59,10 +61,10 @@ impl SpoiltPlan {
     /// The plan as it is now. Beams are traced anew: an error shall be seen, not hidden by beams that know better.
     pub fn into_plan(self) -> FramePlan {
         let field = self.field();
-        let SpoiltPlan { rays, domain, visible, sampling, transfer, occupancy, proxy, features, .. } = self;
+        let SpoiltPlan { rays, domain, visible, sampling, transfer, lighting, occupancy, proxy, features, .. } = self;
         let features = features.without(Feature::SkipBesideBeams);
         let mut plan =
-            FramePlan { field, rays, domain, visible, sampling, transfer, occupancy, beams: None, proxy, features };
+            FramePlan { field, rays, domain, visible, sampling, transfer, lighting, occupancy, beams: None, proxy, features };
         if let (true, Some(side)) = (self.has_beams, plan.field.slots().brick_side()) {
             let overview = Overview::of(side, plan.field.index(), plan.occupancy.as_deref());
             plan.beams = overview.and_then(|overview| Beams::of(&plan, &overview)).map(Arc::new);

@@ -151,7 +151,8 @@ impl Surfaces {
 }
 
 /// The features for which a ray asks the field.
-const READS_FIELD: [Feature; 3] = [Feature::TransferLookup, Feature::SkipEmpty, Feature::SkipMacrocells];
+const READS_FIELD: [Feature; 4] =
+    [Feature::TransferLookup, Feature::SkipEmpty, Feature::SkipMacrocells, Feature::Light];
 
 /// How the knots of a transfer function are searched.
 ///
@@ -299,6 +300,8 @@ impl Variant {
             ("lattice_origin", self.field != FieldKind::Bricks),
             ("wide_blocks", has(Feature::MultiLevel) || has(Feature::SkipEmpty) || self.field != FieldKind::Bricks),
             ("blend", self.field.scheme().is_some()),
+            ("dense", self.field == FieldKind::Dense),
+            ("flat_blocks", matches!(self.field, FieldKind::Blocks(_) | FieldKind::Dense)),
             ("long_rays", self.long_rays),
             ("integer_samples", self.integer_samples),
         ];

@@ -52,7 +52,9 @@ fn variant(options: &[usize; N_OPTIONS]) -> Option<Variant> {
     let is_asked_for = (!is_nominal || variant.rule == QuadratureRule::MidpointExponential)
         && (variant.entry != Entry::Proxy || is_drawn)
         && (variant.field == FieldKind::Bricks || !features.contains(Feature::SkipMacrocells))
-        && (is_of_blocks || !features.contains(Feature::ShortBlocks));
+        && (is_of_blocks || !features.contains(Feature::ShortBlocks))
+        && (features.contains(Feature::TransferLookup) || !features.contains(Feature::Light))
+        && (features.contains(Feature::Light) || !features.contains(Feature::LightBesideEye));
     is_asked_for.then_some(variant)
 }
 
@@ -94,6 +96,9 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
         let shader = compile(&variant);
         assert!(shader.spirv().unwrap().len() > 100);
         let uses = |resource| shader.uses(resource);
+        let is_lit = variant.features.contains(Feature::Light);
+        let draws = matches!(variant.entry, Entry::March | Entry::Proxy);
+        assert_eq!(uses(Resource::Light), is_lit && draws);
         match variant.entry {
             Entry::March => {
                 assert_eq!(shader.workgroup_size, [8, 8, 1]);
@@ -108,8 +113,10 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
             }
             Entry::Proxy => {
                 assert_eq!(shader.module.entry_points.len(), 2);
-                let of_rays = [Resource::Index, Resource::Picture, Resource::SeenBefore, Resource::Beams];
+                let of_rays = [Resource::Picture, Resource::SeenBefore, Resource::Beams];
                 assert!(!of_rays.into_iter().any(uses), "{:?}", resources(&shader));
+                // A gradient may ask the next brick.
+                assert!(!uses(Resource::Index) || variant.features.contains(Feature::Light));
             }
             Entry::Probe(_) => assert!(uses(Resource::Means)),
             Entry::Evaluate(_) => {
@@ -123,7 +130,8 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
 
 #[test]
 fn a_device_with_few_storage_buffers_gets_a_shader_without_shortcuts() {
-    let mut general = Variant::new(FeatureSet::all(), QuadratureRule::MidpointExponential, Entry::March);
+    let unlit = FeatureSet::all().without(Feature::Light).without(Feature::LightBesideEye);
+    let mut general = Variant::new(unlit, QuadratureRule::MidpointExponential, Entry::March);
     general.long_rays = true;
     general.segments.surfaces = Surfaces::TessellatedShells;
     let library = ShaderLibrary::embedded();
@@ -155,12 +163,14 @@ fn every_search_compiles_and_only_the_last_loops() {
 fn what_a_scene_does_not_need_is_left_out() {
     let rule = QuadratureRule::MidpointExponential;
     let all = FeatureSet::all();
-    use Resource::{Atlas, AtlasSampler, Beams, Frame, Index, Knots, Occupancy, Picture};
-    assert_eq!(resources(&march(all, rule)), [Frame, Atlas, AtlasSampler, Index, Knots, Picture, Occupancy, Beams]);
+    use Resource::{Atlas, AtlasSampler, Beams, Frame, Index, Knots, Light, Occupancy, Picture};
+    let of_general = [Frame, Atlas, AtlasSampler, Index, Knots, Picture, Occupancy, Beams, Light];
+    assert_eq!(resources(&march(all, rule)), of_general);
     for (feature, resource) in [
         (Feature::HardwareFilter, AtlasSampler),
         (Feature::SkipMacrocells, Occupancy),
         (Feature::SkipBesideBeams, Beams),
+        (Feature::Light, Light),
     ] {
         assert!(!march(all.without(feature), rule).uses(resource), "{}", resource.name());
     }
@@ -169,6 +179,8 @@ fn what_a_scene_does_not_need_is_left_out() {
     assert_eq!(resources(&skipping), [Frame, Index, Knots, Picture]);
 
     let general = march(all, rule);
+    // Light looks values up.
+    let unlit = all.without(Feature::Light).without(Feature::LightBesideEye);
     let of_blocks = |features| {
         let mut variant = Variant::new(features, rule, Entry::March);
         variant.field = FieldKind::Blocks(Join::Blend(Interblock::MaximumDistance));
@@ -180,6 +192,7 @@ fn what_a_scene_does_not_need_is_left_out() {
                 let features = all.without(Feature::SkipMacrocells);
                 (of_blocks(features), of_blocks(features.without(feature)))
             }
+            Feature::TransferLookup => (march(unlit, rule), march(unlit.without(feature), rule)),
             _ => (general.clone(), march(all.without(feature), rule)),
         };
         assert!(without.counts.expressions < with.counts.expressions, "{}", feature.name());
@@ -194,10 +207,14 @@ fn what_a_scene_does_not_need_is_left_out() {
         ("fn dark_around", Feature::SkipMacrocells),
         ("let beam", Feature::SkipBesideBeams),
         ("    scale: f32", Feature::MultiLevel),
-        ("fn knot_below", Feature::TransferLookup),
+        ("fn shade_at", Feature::Light),
+        ("fn gradient_at", Feature::Light),
+        ("fn towards_light", Feature::LightBesideEye),
     ] {
         assert!(general.wgsl.contains(text) && !march(all.without(feature), rule).wgsl.contains(text), "{text}");
     }
+    assert!(march(unlit, rule).wgsl.contains("fn knot_below"));
+    assert!(!march(unlit.without(Feature::TransferLookup), rule).wgsl.contains("fn knot_below"));
     assert!(!general.wgsl.contains("textureLoad") && !general.wgsl.contains("preintegrate"));
 }
 

@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Interblock, Place};
 use brickfield_frame::{BlockPlaces, FramePlan, IndexEntry, Join, Places, SampleFormat};
-use brickfield_interp::interpolate;
+use brickfield_interp::{Neighbourhood, interpolate};
 
 /// How a sample is read from a slot's bytes.
 trait Stored: Sync {
@@ -71,9 +71,22 @@ pub(super) trait FieldReader: Sync {
     #[inline]
     fn patch_of(&self, cell: UVec3) -> Patch {
         let field = self.plan().field();
-        let IndexEntry::Resident { slot, .. } = field.index().at(cell) else { return Patch { slot: None } };
-        Patch { slot: field.place_at(cell).map(|place| (slot, place)) }
+        let IndexEntry::Resident { slot, .. } = field.index().at(cell) else { return Patch { cell, slot: None } };
+        Patch { cell, slot: field.place_at(cell).map(|place| (slot, place)) }
     }
+
+    /// The patch around an index cell, as gradients ask for it: flat blocks have values even where the index has them as empty.
+    fn lit_patch_of(&self, cell: UVec3) -> Patch {
+        match self.plan().field().slots().places() {
+            Places::Blocks(places) => {
+                Patch { cell, slot: Some((places.layout().ordinal(cell) as u32, places.place(cell))) }
+            }
+            _ => self.patch_of(cell),
+        }
+    }
+
+    /// How many samples of level 0 two neighbouring samples of a patch are apart, at a clamped position of it.
+    fn spacing(&self, patch: &Patch, q: DVec3) -> f64;
 
     /// The stored number that a patch has at a clamped position; `None` if it is empty.
     fn stored(&self, patch: &Patch, q: DVec3) -> Option<f64>;
@@ -106,13 +119,6 @@ pub(super) trait FieldReader: Sync {
         Some(slots.decode().value(self.stored(patch, q)? / slots.format().unit()))
     }
 
-    /// The data value at a sample position; `None` where its patch is empty.
-    #[inline]
-    fn value_at(&self, q: DVec3) -> Option<f64> {
-        let q = self.clamped(q);
-        self.value(&self.patch_of(self.cell_at(q)), q)
-    }
-
     /// Data values between two stored numbers, without sign.
     fn gain(&self) -> f64 {
         let slots = self.plan().field().slots();
@@ -123,8 +129,17 @@ pub(super) trait FieldReader: Sync {
 /// A part of a field with one way to fetch its values.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Patch {
+    /// An index cell of its block.
+    pub(super) cell: UVec3,
     /// Its slot and where that one's samples lie; `None` if nothing is visible there.
     slot: Option<(u32, Place)>,
+}
+
+impl Patch {
+    /// Whether nothing is visible there.
+    pub(super) fn is_empty(&self) -> bool {
+        self.slot.is_none()
+    }
 }
 
 /// The samples between which a number lies.
@@ -207,6 +222,10 @@ impl<S: Stored> FieldReader for Shared<'_, S> {
     fn jumps_between_levels(&self) -> bool {
         true
     }
+
+    fn spacing(&self, patch: &Patch, _: DVec3) -> f64 {
+        patch.slot.map_or(1.0, |(_, place)| f64::from(place.level.stride()))
+    }
 }
 
 /// Flat blocks that are blended.
@@ -263,6 +282,15 @@ impl<S: Stored> FieldReader for Blended<'_, S> {
 
     fn jumps_between_levels(&self) -> bool {
         false
+    }
+
+    /// The mean over the eight blocks, by their weights: as continuous as the field.
+    fn spacing(&self, _: &Patch, q: DVec3) -> f64 {
+        let around = Neighbourhood::around(self.places.layout(), q.to_array());
+        let level = |block| self.places.row(block).level;
+        let weights = around.weights(self.places.layout(), self.scheme, level).into_iter().enumerate();
+        let stride = |b| around.block(b).map_or(0.0, |block| f64::from(level(block).stride()));
+        weights.map(|(b, weight)| weight * stride(b)).sum()
     }
 }
 
