@@ -7,8 +7,8 @@ use brickfield_core::{Aabb, TransferFunction};
 use brickfield_optics::LightSource;
 
 use crate::{
-    Beams, DarkRegions, Division, Feature, FeatureSet, Field, Lighting, Mode, Occupancy, Placement, ProxyGeometry, RayFrame,
-    SampleFormat, Sampling, Target, ValueScale,
+    Beams, DarkRegions, Division, Feature, FeatureSet, Field, Lighting, Mode, Occupancy, Placement, ProxyGeometry,
+    RayFrame, SampleFormat, Sampling, Target, ValueScale,
 };
 
 /// Everything that a backend needs for one frame, and nothing that this frame does not need.

@@ -6,8 +6,8 @@ use brickfield_core::glam::UVec3;
 use brickfield_core::{Aabb, TransferFunction};
 
 use crate::{
-    Beams, Feature, FeatureSet, Field, FramePlan, IndexGrid, Join, Lighting, Occupancy, Overview, ProxyGeometry, RayFrame,
-    Sampling, Slots,
+    Beams, Feature, FeatureSet, Field, FramePlan, IndexGrid, Join, Lighting, Occupancy, Overview, ProxyGeometry,
+    RayFrame, Sampling, Slots,
 };
 
 /// A plan taken apart. It is put together again without validation: the plan may be wrong in any way.
@@ -63,8 +63,19 @@ impl SpoiltPlan {
         let field = self.field();
         let SpoiltPlan { rays, domain, visible, sampling, transfer, lighting, occupancy, proxy, features, .. } = self;
         let features = features.without(Feature::SkipBesideBeams);
-        let mut plan =
-            FramePlan { field, rays, domain, visible, sampling, transfer, lighting, occupancy, beams: None, proxy, features };
+        let mut plan = FramePlan {
+            field,
+            rays,
+            domain,
+            visible,
+            sampling,
+            transfer,
+            lighting,
+            occupancy,
+            beams: None,
+            proxy,
+            features,
+        };
         if let (true, Some(side)) = (self.has_beams, plan.field.slots().brick_side()) {
             let overview = Overview::of(side, plan.field.index(), plan.occupancy.as_deref());
             plan.beams = overview.and_then(|overview| Beams::of(&plan, &overview)).map(Arc::new);

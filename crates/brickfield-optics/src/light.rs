@@ -226,7 +226,9 @@ mod tests {
     fn a_steep_surface_is_lamberts_and_a_flat_medium_is_as_without_light() {
         let (eye, slant) = (DVec3::Z, DVec3::new(0.6, 0.0, 0.8));
         let steep = head().shade(slant * -1e9, eye, eye);
-        assert!((steep.factor - (0.1 + 0.7 * 0.8)).abs() < 1e-9 && (steep.highlight - 0.4 * 0.8f64.powi(20)).abs() < 1e-9);
+        assert!(
+            (steep.factor - (0.1 + 0.7 * 0.8)).abs() < 1e-9 && (steep.highlight - 0.4 * 0.8f64.powi(20)).abs() < 1e-9
+        );
         assert_eq!(head().shade(DVec3::ZERO, eye, eye), Shade::NONE);
         let half = head().shade(eye * -2.0, eye, eye);
         let strength = 0.5f64.sqrt();

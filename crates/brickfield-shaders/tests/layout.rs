@@ -2,7 +2,9 @@
 
 use std::mem::{offset_of, size_of};
 
-use brickfield_frame::{FeatureSet, Fetch, FrameUniforms, KnotUniform, LightUniform, PlaceUniform, ProbeUniforms, QuadratureRule};
+use brickfield_frame::{
+    FeatureSet, Fetch, FrameUniforms, KnotUniform, LightUniform, PlaceUniform, ProbeUniforms, QuadratureRule,
+};
 use brickfield_shaders::naga::{Module, TypeInner};
 use brickfield_shaders::{Entry, FieldKind, Variant, specialise};
 

@@ -3,7 +3,7 @@
 use brickfield_bricks::{BlockSource, FetchError};
 use brickfield_core::glam::UVec3;
 use brickfield_core::{Aabb, BlockLayout, BlockSide, Level, Projection, TransferFunction, ValueRange};
-use brickfield_frame::{Drawing, FramePlan, IndexEntry, Join, PlanError, PlanParts};
+use brickfield_frame::{Drawing, FramePlan, IndexEntry, Join, Lighting, PlanError, PlanParts};
 use rayon::prelude::*;
 
 use crate::course::{Course, segment_reach, to_sample_space};
@@ -82,7 +82,8 @@ pub fn prepare_blocks(
     };
     let field = residency.field(source, drawn, style.join);
     let parts = PlanParts::new(field, rays, domain, sampling, scene.transfer.clone());
-    Ok(FramePlan::new(PlanParts { drawing, ..parts })?)
+    let lighting = scene.light.map(|light| Lighting::new(light, source.grid()));
+    Ok(FramePlan::new(PlanParts { lighting, drawing, ..parts })?)
 }
 
 fn check_levels(layout: &BlockLayout, levels: &[Level]) -> Result<(), PrepareBlocksError> {

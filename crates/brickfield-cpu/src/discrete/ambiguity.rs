@@ -157,13 +157,7 @@ impl Ambiguity {
     }
 
     /// How much a node's shade may change where its gradient jumps.
-    fn shade_jump(
-        &self,
-        field: &impl FieldReader,
-        ray: &PlanRay,
-        (part, p): (CutSegment, DVec3),
-        delta: DVec3,
-    ) -> f64 {
+    fn shade_jump(&self, field: &impl FieldReader, ray: &PlanRay, (part, p): (CutSegment, DVec3), delta: DVec3) -> f64 {
         let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(p)));
         match self.shades_stray && !patch.is_empty() {
             true => shade_jump(field, &patch, p, ray, delta),
@@ -172,13 +166,7 @@ impl Ambiguity {
     }
 
     /// What a node of `part` at `p` may be.
-    fn nodes(
-        &self,
-        field: &impl FieldReader,
-        ray: &PlanRay,
-        (part, p): (CutSegment, DVec3),
-        delta: DVec3,
-    ) -> Nodes {
+    fn nodes(&self, field: &impl FieldReader, ray: &PlanRay, (part, p): (CutSegment, DVec3), delta: DVec3) -> Nodes {
         let q = field.clamped(p);
         let own = part.cell.unwrap_or_else(|| field.cell_at(q));
         let mut nodes = Vec::new();

@@ -29,8 +29,8 @@ use rayon::prelude::*;
 use super::change::{Nodes, spread};
 use super::field::{Around, FieldReader, Patch, Work, with_field};
 use super::light::{Beside, Node, shade_error};
-use super::{part_nodes, relative};
 use super::walk::{CutSegment, clip, parts};
+use super::{part_nodes, relative};
 
 /// Roundings that `RayFrame::rounding` reckons with at worst; here one of them.
 const AT_WORST: f64 = 8.0;
@@ -141,7 +141,8 @@ fn shade_off(
         return 0.0;
     }
     let rounding = OF_VALUE * field.plan().value_scale().unit();
-    let error = |b: &Beside| rounding + field.around(&b.patch, b.at).map_or(0.0, |around| stray(&b.patch, b.at, &around));
+    let error =
+        |b: &Beside| rounding + field.around(&b.patch, b.at).map_or(0.0, |around| stray(&b.patch, b.at, &around));
     let off = shade_error(field, lighting, (&patch, p, ray), delta, error);
     off.factor + off.highlight
 }

@@ -20,12 +20,14 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     check_picture_path(&args.out).map_err(Failure::usage)?;
     args.view.check()?;
     args.sampling.check()?;
+    args.light.check()?;
     let mut backend = open(args)?;
     if let Some(side) = args.flat.blocks {
         return render_blocks(args, side, backend.as_mut());
     }
     let subject = Subject::open(&args.file, &args.input, &args.tree, &args.view)?;
     let scene = args.sampling.of(args.view.scene(&subject)?, Some(&subject.volume))?;
+    let scene = args.light.of(scene, subject.volume.range(), subject.tree.grid())?;
     let mut residency = Residency::default();
     let plan = prepare(&subject.tree, &scene, &mut residency).map_err(Failure::usage)?;
     note_if_nothing_shows(&plan);
@@ -49,6 +51,7 @@ fn render_blocks(args: &RenderArgs, side: BlockSide, backend: &mut dyn Backend) 
     let grid = subject.source.grid();
     let scene = args.view.scene_of(grid, subject.frame, &subject.transfer)?;
     let scene = args.sampling.of(scene, subject.volume.as_deref())?;
+    let scene = args.light.of(scene, subject.source.range(), grid)?;
     let selection = args.flat.select(&subject, &scene)?;
     let (levels, mut residency) = (&selection.levels, BlockResidency::default());
     let plan = prepare_blocks(subject.source.as_ref(), &scene, levels.levels(), args.flat.style(), &mut residency)?;
