@@ -214,7 +214,7 @@ mutants! {
     /// The side of higher values is never lit.
     BACK_IN_THE_DARK: "back-in-the-dark", "light", "facing", "light.back.x * cosine" => "0.0";
     /// Pre-integrated segments have the shade of their near end.
-    NEAR_SHADE_ALONE: "near-shade-alone", "light", "lit_segment", "0.5 * (near.factor + far.factor)" => "near.factor";
+    NEAR_SHADE_ALONE: "near-shade-alone", "light", "between", "0.5 * (near.factor + far.factor)" => "near.factor";
     /// Gradients do not ask the next brick.
     GRADIENT_OF_ONE_PATCH: "gradient-of-one-patch", "gradient", "beside", "all(p >= area.region.low) && all(p < area.region.high)"
         => "true";

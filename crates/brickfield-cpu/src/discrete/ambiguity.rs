@@ -158,11 +158,11 @@ impl Ambiguity {
 
     /// How much a node's shade may change where its gradient jumps.
     fn shade_jump(&self, field: &impl FieldReader, ray: &PlanRay, (part, p): (CutSegment, DVec3), delta: DVec3) -> f64 {
-        let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(p)));
-        match self.shades_stray && !patch.is_empty() {
-            true => shade_jump(field, &patch, p, ray, delta),
-            false => 0.0,
+        if !self.shades_stray {
+            return 0.0;
         }
+        let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(p)));
+        if patch.is_empty() { 0.0 } else { shade_jump(field, &patch, p, ray, delta) }
     }
 
     /// What a node of `part` at `p` may be.

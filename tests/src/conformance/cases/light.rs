@@ -15,7 +15,7 @@ use crate::conformance::case::Case;
 use crate::conformance::plan_mutants::PlanMutant::*;
 use crate::conformance::shader_mutants as shader;
 use crate::conformance::storage::Storage;
-use crate::volumes::spread;
+use crate::volumes::{fill_unit, spread};
 
 /// Every term counts; highlights are small.
 const SHINY: LightTerms = LightTerms { ambient: 0.15, diffuse: 0.7, specular: 0.5, shininess: 20 };
@@ -102,9 +102,17 @@ fn bricks() -> Vec<Case> {
             let volume = sparse(&large(), u8);
             Setup::new(volume, soft(u8)).lit(LightSource::Head, SHINY)
         }),
-        picture("light/skipping-full-bricks-gauss2", catches![shader::GRADIENT_OF_ONE_PATCH], move || {
+        picture("light/skipping-full-bricks-gauss2", catches![shader::SURFACES_EVERYWHERE], move || {
             let volume = checkers(UVec3::new(71, 66, 53));
             Setup::new(volume, soft(u8)).lit(ASIDE, SHINY).rule(QuadratureRule::Gauss2).step(0.9)
+        }),
+        // All of the second brick is transparent: only gradients ask for it.
+        picture("light/beside-the-dark", catches![BrickTransparent, shader::GRADIENT_OF_ONE_PATCH], move || {
+            let square = |x: f64| (x / 31.0).powi(2);
+            let knots = [knot(square(15.3), 0.3, WARM), knot(square(15.4), 0.0, COOL)];
+            let grid = Grid::axis_aligned(UVec3::new(31, 16, 16), DVec3::ONE).expect("a grid");
+            let volume = fill_unit(&grid, u16, |p| square(p.x));
+            Setup::new(volume, spread(&knots, u16).expect("knots ascend")).lit(ASIDE, SHINY)
         }),
         picture("light/polygons", catches![PolygonsReversed, shader::GRADIENT_OF_ONE_PATCH], move || {
             lit(u16, ASIDE).with(|s| {
