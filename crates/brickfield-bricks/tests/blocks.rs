@@ -7,10 +7,11 @@ use std::sync::Arc;
 
 use brickfield_bricks::{
     BlockBuildError, BlockOptions, BlockSource, BlockVolume, NoSuchBlock, block_memory, build_blocks, fetch_values,
+    greatest_spread,
 };
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{
-    BlockLayout, BlockSide, BlockSummary, Grid, Level, N_BLOCK_BINS, Rescale, ScalarType, ValueRange, Volume, Voxels,
+    BlockLayout, BlockSide, BlockSummary, Companion, Grid, Level, N_BLOCK_BINS, Rescale, ScalarType, ValueRange, Volume, Voxels,
 };
 use noise::{index, noise, points, volume};
 use proptest::prelude::*;
@@ -128,6 +129,31 @@ proptest! {
         for level in side.levels() {
             let [a, b] = [&alone, &among_others].map(|source| fetch_values(source, block, level).unwrap());
             prop_assert_eq!(a, b);
+        }
+    }
+
+    #[test]
+    fn spreads_are_those_of_the_voxels_that_samples_average(volume in volumes(), side in side()) {
+        let source = blocks(&volume, side);
+        let (layout, greatest) = (source.layout(), greatest_spread(&source));
+        for (block, level) in all(layout) {
+            let mut codes = Vec::new();
+            source.fetch_companion(Companion::Spread, block, level, &mut codes).unwrap();
+            prop_assert_eq!(codes.len(), layout.n_samples(block, level).element_product() as usize);
+            let samples = points(layout.n_samples(block, level)).zip(fetch_values(&source, block, level).unwrap());
+            for (code, sample) in codes.into_iter().zip(samples) {
+                let values: Vec<f64> = covered(layout, block, level, sample.0).map(|i| volume.value(i)).collect();
+                let (mean, stored) = (values.iter().sum::<f64>() / values.len() as f64, sample.1);
+                let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
+                let ends = values.iter().fold((stored, stored), |(a, b), v| (a.min(*v), b.max(*v)));
+                let room = (stored - ends.0).min(ends.1 - stored);
+                let codes = |spread: f64| if spread > 0.0 { spread / greatest * 255.0 } else { 0.0 };
+                let (wanted, most) = (codes((3.0 * variance).sqrt()), codes(room));
+                let code = f64::from(code);
+                prop_assert!(code <= most + 1e-6 && code <= wanted + 0.5 + 1e-6, "{code} for {wanted}, at most {most}");
+                prop_assert!(code >= (wanted - 0.5).min(most - 1.0) - 1e-6, "{code} for {wanted}, at most {most}");
+                prop_assert!(level > Level(0) || code == 0.0);
+            }
         }
     }
 

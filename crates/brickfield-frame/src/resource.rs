@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use brickfield_core::Companion;
+
 use crate::{Chunked, FramePlan, KnotUniform, LightUniform, Slots};
 
 /// A buffer, texture or sampler, by the name that it has in shaders (`frame.wesl`).
@@ -23,6 +25,10 @@ pub enum Resource {
     Places,
     /// The level of each flat block, and where its samples lie.
     Blocks,
+    /// The spreads of flat blocks' samples, each at its sample's texel, a 3-D texture.
+    Spreads,
+    /// For each flat block that is one sample, its spread.
+    OneSpreads,
     /// The transfer function's knots.
     Knots,
     /// The light on surfaces ([`LightUniform`]).
@@ -61,13 +67,15 @@ pub enum Content<'a> {
 
 impl Resource {
     /// All resources.
-    pub const ALL: [Resource; 18] = [
+    pub const ALL: [Resource; 20] = [
         Resource::Frame,
         Resource::Atlas,
         Resource::AtlasSampler,
         Resource::Index,
         Resource::Places,
         Resource::Blocks,
+        Resource::Spreads,
+        Resource::OneSpreads,
         Resource::Knots,
         Resource::Light,
         Resource::Picture,
@@ -91,6 +99,8 @@ impl Resource {
             Resource::Index => "index",
             Resource::Places => "places",
             Resource::Blocks => "blocks",
+            Resource::Spreads => "spreads",
+            Resource::OneSpreads => "one_spreads",
             Resource::Knots => "knots",
             Resource::Light => "light",
             Resource::Picture => "picture",
@@ -122,6 +132,11 @@ impl FramePlan {
             Resource::Index => Some(Content::Chunks(&**self.field.index())),
             Resource::Places => self.field.slots().place_table().map(Content::Chunks),
             Resource::Blocks => self.field.slots().block_table().map(Content::Chunks),
+            Resource::Spreads => self.field.companions(Companion::Spread).map(|slots| Content::Texture(slots)),
+            Resource::OneSpreads => {
+                let slots = self.field.companions(Companion::Spread)?;
+                slots.one_table().map(Content::Chunks)
+            }
             Resource::Knots => bytes(bytemuck::cast_slice(&KnotUniform::of(self))),
             Resource::Light => LightUniform::of(self).and_then(|light| bytes(bytemuck::bytes_of(&light))),
             Resource::Occupancy => self.occupancy.as_ref().map(|occupancy| Content::Chunks(&**occupancy)),

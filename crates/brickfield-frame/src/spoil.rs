@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use brickfield_core::glam::UVec3;
-use brickfield_core::{Aabb, TransferFunction};
+use brickfield_core::{Aabb, Companion, TransferFunction};
 
 use crate::{
     Beams, Feature, FeatureSet, Field, FramePlan, IndexGrid, Join, Lighting, Occupancy, Overview, ProxyGeometry,
@@ -18,6 +18,7 @@ pub struct SpoiltPlan {
     pub index: Arc<IndexGrid>,
     pub slots: Arc<Slots>,
     pub join: Join,
+    pub companions: [Option<Arc<Slots>>; Companion::ALL.len()],
     pub rays: RayFrame,
     pub domain: Aabb,
     pub visible: Aabb,
@@ -40,6 +41,7 @@ impl SpoiltPlan {
             index: field.index().clone(),
             slots: field.slots().clone(),
             join: field.join(),
+            companions: Companion::ALL.map(|companion| field.companions(companion).cloned()),
             rays,
             domain,
             visible,
@@ -55,7 +57,8 @@ impl SpoiltPlan {
 
     /// The field as it is now.
     pub fn field(&self) -> Field {
-        Field::unchecked(self.dims, self.index.clone(), self.slots.clone(), self.join)
+        let companions = self.companions.clone();
+        Field::unchecked(self.dims, self.index.clone(), self.slots.clone(), self.join, companions)
     }
 
     /// The plan as it is now. Beams are traced anew: an error shall be seen, not hidden by beams that know better.

@@ -68,7 +68,7 @@ pub fn prepare_blocks(
     check_levels(source.layout(), levels)?;
     let coarsest = levels.iter().copied().max().unwrap_or(Level(0));
     let Course { domain, sampling, rays } = Course::new(source.grid(), scene, coarsest)?;
-    residency.hold(source, levels)?;
+    residency.hold(source, levels, &[])?;
     let style = match scene.quality {
         Quality::Final => style,
         Quality::Draft => BlockStyle { join: Join::Shared, ..style },

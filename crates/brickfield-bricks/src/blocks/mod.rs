@@ -4,10 +4,11 @@ mod build;
 mod memory;
 mod shrink;
 mod source;
+mod spread;
 mod summary;
 mod volume;
 
 pub use build::{BlockBuildError, BlockOptions, block_summaries, build_blocks};
 pub use memory::{BlockMemory, BlockTally, block_memory};
-pub use source::{BlockSource, FetchError, NoSuchBlock, SourceId, fetch_values};
+pub use source::{BlockSource, FetchError, NoCompanion, NoSuchBlock, SourceId, fetch_values, greatest_spread};
 pub use volume::BlockVolume;

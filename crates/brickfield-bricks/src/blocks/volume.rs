@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use brickfield_core::glam::UVec3;
 use brickfield_core::{
-    BlockLayout, BlockSummary, Grid, Level, Rescale, ScalarType, ValueRange, Volume, Voxels, with_voxels,
+    BlockLayout, BlockSummary, Companion, Grid, Level, Rescale, ScalarType, ValueRange, Volume, Voxels, with_voxels,
 };
 
 use super::shrink::BlockVoxels;
-use super::source::{BlockSource, FetchError, SourceId};
+use super::source::{BlockSource, FetchError, SourceId, fetch_values};
+use super::spread::spread_codes;
 use crate::sample::BrickScalar;
 
 /// A volume as flat blocks of every resolution (Ljung, Lundstroem and Ynnerman 2006, section 3.1).
@@ -24,6 +25,7 @@ pub struct BlockVolume {
     /// Block after block by ordinal: its averages of level 1, then 2, ... to one sample.
     pub(crate) averages: Voxels,
     pub(crate) summaries: Arc<[BlockSummary]>,
+    pub(crate) greatest_spread: f64,
 }
 
 impl BlockVolume {
@@ -93,6 +95,23 @@ impl BlockSource for BlockVolume {
             Level(0) => self.copy_voxels(block, out),
             _ => self.copy_averages(block, level, n, out),
         }
+        Ok(())
+    }
+
+    /// Computed from the voxels of the block: a volume keeps no companions. About 30 us for 16^3 voxels.
+    fn fetch_companion(
+        &self,
+        companion: Companion,
+        block: UVec3,
+        level: Level,
+        out: &mut Vec<u8>,
+    ) -> Result<(), FetchError> {
+        let Companion::Spread = companion;
+        let of_block = (self.summaries[self.layout.ordinal(block)].range, self.rescale());
+        let values = fetch_values(self, block, level)?;
+        *out = with_voxels!(self.volume.voxels(), v => {
+            spread_codes(BlockVoxels::new(v, &self.layout, block), level, of_block, &values, self.greatest_spread)
+        });
         Ok(())
     }
 }
