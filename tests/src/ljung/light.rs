@@ -10,14 +10,13 @@ use std::sync::Arc;
 use brickfield::bricks::{BlockOptions, BrickTree, BuildOptions, Downsampling, build_blocks, build_tree};
 use brickfield::frame::{FramePlan, Join};
 use brickfield::lod::{BlockLevels, Criterion};
-use brickfield::{BlockResidency, Residency, Scene, prepare, prepare_blocks};
+use brickfield::{BlockResidency, BlockStyle, Residency, Scene, TransparentBlocks, prepare, prepare_blocks};
 use brickfield_core::glam::{DMat3, DVec3, UVec2, UVec3};
 use brickfield_core::{BlockSide, Camera, Grid, Interblock, Knot, Level, ScalarType, TransferFunction, Volume};
 use brickfield_optics::{Light, LightSource, LightTerms};
 use serde::Serialize;
 
 use super::LjungArgs;
-use super::schemes::style;
 use crate::compare::rivals::Rivals;
 use crate::paper::{Missed, PaperError, print};
 use crate::volumes::fill;
@@ -152,7 +151,8 @@ impl Ball {
                 let options = BlockOptions { side: BLOCK, ..BlockOptions::default() };
                 let blocks = build_blocks(Arc::clone(&self.volume), &options)?;
                 let levels = BlockLevels::uniform(*brickfield::bricks::BlockSource::layout(&blocks), level);
-                let style = style(Join::Blend(Interblock::MaximumDistance));
+                let join = Join::Blend(Interblock::MaximumDistance);
+                let style = BlockStyle { join, transparent: TransparentBlocks::Blended };
                 Ok(prepare_blocks(&blocks, scene, levels.levels(), style, &mut BlockResidency::default())?)
             }
         }
