@@ -11,7 +11,8 @@ use brickfield_bricks::{
 };
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{
-    BlockLayout, BlockSide, BlockSummary, Companion, Grid, Level, N_BLOCK_BINS, Rescale, ScalarType, ValueRange, Volume, Voxels,
+    BlockLayout, BlockSide, BlockSummary, Companion, Grid, Level, N_BLOCK_BINS, Rescale, ScalarType, ValueRange,
+    Volume, Voxels,
 };
 use noise::{index, noise, points, volume};
 use proptest::prelude::*;

@@ -24,11 +24,13 @@ pub enum Feature {
     Light,
     /// The light is elsewhere than the eye.
     LightBesideEye,
+    /// Normals are of gradients that lie beside the samples.
+    StoredGradients,
 }
 
 impl Feature {
     /// All features.
-    pub const ALL: [Feature; 10] = [
+    pub const ALL: [Feature; 11] = [
         Feature::HardwareFilter,
         Feature::EarlyTermination,
         Feature::SkipEmpty,
@@ -39,6 +41,7 @@ impl Feature {
         Feature::TransferLookup,
         Feature::Light,
         Feature::LightBesideEye,
+        Feature::StoredGradients,
     ];
 
     /// The feature's name in shader conditions (`@if(name)`) and reports.
@@ -54,6 +57,7 @@ impl Feature {
             Feature::TransferLookup => "transfer_lookup",
             Feature::Light => "light",
             Feature::LightBesideEye => "light_beside_eye",
+            Feature::StoredGradients => "stored_gradients",
         }
     }
 }

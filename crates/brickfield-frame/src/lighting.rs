@@ -28,6 +28,12 @@ impl Lighting {
         self.sample_to_world.matrix3.inverse().transpose()
     }
 
+    /// World units between neighbouring samples of level 0 along each axis of the grid.
+    pub fn spacing(&self) -> DVec3 {
+        let DMat3 { x_axis, y_axis, z_axis } = self.sample_to_world.matrix3;
+        DVec3::new(x_axis.length(), y_axis.length(), z_axis.length())
+    }
+
     /// The direction of length 1 from a sample position towards the light; `to_eye` is the one towards the eye. 0 at the light.
     pub fn to_light(&self, sample_position: DVec3, to_eye: DVec3) -> DVec3 {
         match self.light.source() {
@@ -68,6 +74,8 @@ pub struct LightUniform {
     pub specular: f32,
     /// The exponent of highlights.
     pub shininess: u32,
+    /// Numbers of the value scale per voxel along each axis that the greatest stored gradient stands for; nothing of others.
+    pub greatest_slope: [f32; 4],
     /// First, a factor of cosines below 0: 0, or -1 if both sides of surfaces are lit.
     pub back: [f32; 4],
 }
@@ -97,6 +105,10 @@ impl LightUniform {
             diffuse: terms.diffuse as f32,
             specular: terms.specular as f32,
             shininess: terms.shininess,
+            greatest_slope: plan.gradients().map_or([0.0; 4], |gradients| {
+                let greatest = gradients.decode().scale / plan.value_scale().unit();
+                row(lighting.spacing() * greatest, 0.0)
+            }),
             back: match light.sides() {
                 LitSides::Lower => [0.0; 4],
                 LitSides::Both => [-1.0, 0.0, 0.0, 0.0],

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use brickfield_core::glam::{UVec2, UVec3};
-use brickfield_core::{Aabb, TransferFunction};
-use brickfield_optics::LightSource;
+use brickfield_core::{Aabb, Companion, TransferFunction};
+use brickfield_optics::{LightSource, Normals};
 
 use crate::{
     Beams, DarkRegions, Division, Feature, FeatureSet, Field, Lighting, Mode, Occupancy, Placement, ProxyGeometry,
-    RayFrame, SampleFormat, Sampling, Target, ValueScale,
+    RayFrame, SampleFormat, Sampling, Slots, Target, ValueScale,
 };
 
 /// Everything that a backend needs for one frame, and nothing that this frame does not need.
@@ -90,6 +90,10 @@ pub enum PlanError {
     Domain { domain: Aabb, volume: Aabb },
     #[error("dark regions of another field: rays would pass over samples that are seen")]
     OtherField,
+    #[error(
+        "light on stored normals, of samples without gradients: take normals of central differences, or flat blocks"
+    )]
+    NoGradients,
     #[error("polygons of spherical shells: a sphere has none; take tessellated shells")]
     RoundPolygons,
     #[error("polygons of whole rays: they are clipped to bricks; divide bricks")]
@@ -102,7 +106,7 @@ impl FramePlan {
     /// The plan of some parts.
     ///
     /// # Errors
-    /// A domain outside of the volume; dark regions of another field; polygons of surfaces that have none, or of blocks that
+    /// A domain outside of the volume; dark regions of another field; stored normals without gradients; polygons of surfaces that have none, or of blocks that
     /// are not resident.
     pub fn new(parts: PlanParts) -> Result<FramePlan, PlanError> {
         check(&parts)?;
@@ -154,6 +158,7 @@ impl FramePlan {
             // A value is looked up, and its gradient.
             (Feature::TransferLookup, self.transfer.knots().len() > 1 || self.lighting.is_some()),
             (Feature::Light, self.lighting.is_some()),
+            (Feature::StoredGradients, self.gradients().is_some()),
             (Feature::LightBesideEye, self.lighting.is_some_and(|l| l.light.source() != LightSource::Head)),
         ];
         needed.into_iter().filter_map(|(feature, is_needed)| is_needed.then_some(feature)).collect()
@@ -199,6 +204,12 @@ impl FramePlan {
     #[inline]
     pub fn lighting(&self) -> Option<&Lighting> {
         self.lighting.as_ref()
+    }
+
+    /// The gradients of the samples; `None` where none are asked for.
+    pub fn gradients(&self) -> Option<&Arc<Slots>> {
+        let is_asked = self.lighting.is_some_and(|lighting| lighting.light.normals() == Normals::Stored);
+        self.field.companions(Companion::Gradient).filter(|_| is_asked)
     }
 
     /// Which macrocells of bricks are dark; `None` where nothing inside a brick is leapt over.
@@ -265,6 +276,10 @@ fn check(parts: &PlanParts) -> Result<(), PlanError> {
     }
     if !parts.dark.is_of(field) {
         return Err(PlanError::OtherField);
+    }
+    let is_stored = parts.lighting.is_some_and(|lighting| lighting.light.normals() == Normals::Stored);
+    if is_stored && field.companions(Companion::Gradient).is_none() {
+        return Err(PlanError::NoGradients);
     }
     let Drawing::Polygons { back_to_front, .. } = &parts.drawing else { return Ok(()) };
     if parts.rays.placement == Placement::Shells {

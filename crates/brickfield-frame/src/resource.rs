@@ -29,6 +29,10 @@ pub enum Resource {
     Spreads,
     /// For each flat block that is one sample, its spread.
     OneSpreads,
+    /// The gradients of flat blocks' samples, each at its sample's texel, a 3-D texture.
+    Gradients,
+    /// For each flat block that is one sample, its gradient.
+    OneGradients,
     /// The transfer function's knots.
     Knots,
     /// The light on surfaces ([`LightUniform`]).
@@ -67,7 +71,7 @@ pub enum Content<'a> {
 
 impl Resource {
     /// All resources.
-    pub const ALL: [Resource; 20] = [
+    pub const ALL: [Resource; 22] = [
         Resource::Frame,
         Resource::Atlas,
         Resource::AtlasSampler,
@@ -76,6 +80,8 @@ impl Resource {
         Resource::Blocks,
         Resource::Spreads,
         Resource::OneSpreads,
+        Resource::Gradients,
+        Resource::OneGradients,
         Resource::Knots,
         Resource::Light,
         Resource::Picture,
@@ -101,6 +107,8 @@ impl Resource {
             Resource::Blocks => "blocks",
             Resource::Spreads => "spreads",
             Resource::OneSpreads => "one_spreads",
+            Resource::Gradients => "gradients",
+            Resource::OneGradients => "one_gradients",
             Resource::Knots => "knots",
             Resource::Light => "light",
             Resource::Picture => "picture",
@@ -137,6 +145,8 @@ impl FramePlan {
                 let slots = self.field.companions(Companion::Spread)?;
                 slots.one_table().map(Content::Chunks)
             }
+            Resource::Gradients => self.gradients().map(|slots| Content::Texture(slots)),
+            Resource::OneGradients => self.gradients().and_then(|slots| slots.one_table()).map(Content::Chunks),
             Resource::Knots => bytes(bytemuck::cast_slice(&KnotUniform::of(self))),
             Resource::Light => LightUniform::of(self).and_then(|light| bytes(bytemuck::bytes_of(&light))),
             Resource::Occupancy => self.occupancy.as_ref().map(|occupancy| Content::Chunks(&**occupancy)),

@@ -18,7 +18,7 @@ mod transfer_file;
 pub use automatic::{automatic, diagonal_world};
 #[cfg(feature = "color")]
 pub use difference::{ColorDifferences, ColorMetric, PixelCountError, cie_luv};
-pub use light::{Light, LightError, LightSource, LightTerms, LitSides, Shade, flat_below};
+pub use light::{Light, LightError, LightSource, LightTerms, LitSides, Normals, Shade, flat_below};
 pub use narrow_peak::{NarrowPeak, narrow_peak};
 pub use opacity::{OPAQUE_DEPTH, alpha, depth, rescale_alpha, transmittance};
 #[cfg(feature = "color")]

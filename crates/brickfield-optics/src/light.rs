@@ -22,6 +22,7 @@ pub struct Light {
     terms: LightTerms,
     flat_below: f64,
     sides: LitSides,
+    normals: Normals,
 }
 
 /// Where light comes from.
@@ -64,6 +65,16 @@ pub enum LitSides {
     Lower,
     /// Both.
     Both,
+}
+
+/// Where normals come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Normals {
+    /// Differences of the field's values.
+    #[default]
+    Central,
+    /// Gradients that were computed before, and lie beside the samples.
+    Stored,
 }
 
 /// Numbers that make no light.
@@ -124,13 +135,19 @@ impl Light {
         if !(flat_below.is_finite() && flat_below > 0.0) {
             return Err(LightError::FlatBelow { flat_below });
         }
-        Ok(Light { source, terms, flat_below, sides: LitSides::Lower })
+        Ok(Light { source, terms, flat_below, sides: LitSides::Lower, normals: Normals::Central })
     }
 
     /// The light on other sides of surfaces.
     #[must_use]
     pub fn on_sides(self, sides: LitSides) -> Light {
         Light { sides, ..self }
+    }
+
+    /// The light on surfaces whose normals come from elsewhere.
+    #[must_use]
+    pub fn on_normals(self, normals: Normals) -> Light {
+        Light { normals, ..self }
     }
 
     /// Where it comes from; a direction has length 1.
@@ -151,6 +168,11 @@ impl Light {
     /// The sides of surfaces that it falls on.
     pub fn sides(&self) -> LitSides {
         self.sides
+    }
+
+    /// Where surfaces' normals come from.
+    pub fn normals(&self) -> Normals {
+        self.normals
     }
 
     /// The shade where the field has a gradient, in data values per world unit; the light and the eye are in these directions of

@@ -75,9 +75,13 @@ fn rounds_per_segment(plan: &FramePlan) -> f64 {
     3.0 + pieces + search + nodes
 }
 
-/// Values of the field that a node asks for: with light, six more for its gradient.
+/// Values of the field that a node asks for: with light, six more for its gradient, or the stored one.
 fn values_per_node(plan: &FramePlan) -> f64 {
-    if plan.lighting().is_some() { 7.0 } else { 1.0 }
+    match (plan.lighting(), plan.gradients()) {
+        (None, _) => 1.0,
+        (_, Some(_)) => 2.0,
+        (_, None) => 7.0,
+    }
 }
 
 fn rows_per_pass(plan: &FramePlan, group_height: u32) -> u32 {

@@ -267,13 +267,17 @@ impl Variant {
     }
 
     /// The modules that are compiled, one for each path that several modules share.
-    pub(crate) fn chosen_modules(self) -> [&'static str; 2] {
+    pub(crate) fn chosen_modules(self) -> [&'static str; 3] {
         let integrate = match self.segments.division {
             Division::Brick => "integrate/bricks",
             Division::Ray if self.reads_field() => "integrate/rays",
             Division::Ray => "integrate/constant",
         };
-        [self.field.module(), integrate]
+        let gradient = match self.features.contains(Feature::StoredGradients) {
+            true => "gradient/stored",
+            false => "gradient/central",
+        };
+        [self.field.module(), integrate, gradient]
     }
 
     fn reads_field(self) -> bool {

@@ -17,6 +17,10 @@ fn march(features: FeatureSet, rule: QuadratureRule) -> Specialised {
     compile(&Variant::new(features, rule, Entry::March))
 }
 
+fn unlit(features: FeatureSet) -> FeatureSet {
+    features.without(Feature::Light).without(Feature::LightBesideEye).without(Feature::StoredGradients)
+}
+
 fn resources(shader: &Specialised) -> Vec<Resource> {
     shader.bindings.iter().map(|b| b.resource).collect()
 }
@@ -54,7 +58,9 @@ fn variant(options: &[usize; N_OPTIONS]) -> Option<Variant> {
         && (variant.field == FieldKind::Bricks || !features.contains(Feature::SkipMacrocells))
         && (is_of_blocks || !features.contains(Feature::ShortBlocks))
         && (features.contains(Feature::TransferLookup) || !features.contains(Feature::Light))
-        && (features.contains(Feature::Light) || !features.contains(Feature::LightBesideEye));
+        && (features.contains(Feature::Light) || !features.contains(Feature::LightBesideEye))
+        && (features.contains(Feature::Light) && matches!(variant.field, FieldKind::Blocks(_) | FieldKind::Dense)
+            || !features.contains(Feature::StoredGradients));
     is_asked_for.then_some(variant)
 }
 
@@ -99,6 +105,9 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
         let is_lit = variant.features.contains(Feature::Light);
         let draws = matches!(variant.entry, Entry::March | Entry::Proxy);
         assert_eq!(uses(Resource::Light), is_lit && draws);
+        let is_stored = variant.features.contains(Feature::StoredGradients);
+        assert_eq!(uses(Resource::Gradients), is_stored && draws);
+        assert_eq!(uses(Resource::OneGradients), is_stored && draws && variant.field != FieldKind::Dense);
         match variant.entry {
             Entry::March => {
                 assert_eq!(shader.workgroup_size, [8, 8, 1]);
@@ -130,7 +139,7 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
 
 #[test]
 fn a_device_with_few_storage_buffers_gets_a_shader_without_shortcuts() {
-    let unlit = FeatureSet::all().without(Feature::Light).without(Feature::LightBesideEye);
+    let unlit = unlit(FeatureSet::all());
     let mut general = Variant::new(unlit, QuadratureRule::MidpointExponential, Entry::March);
     general.long_rays = true;
     general.segments.surfaces = Surfaces::TessellatedShells;
@@ -162,7 +171,8 @@ fn every_search_compiles_and_only_the_last_loops() {
 #[test]
 fn what_a_scene_does_not_need_is_left_out() {
     let rule = QuadratureRule::MidpointExponential;
-    let all = FeatureSet::all();
+    // Bricks have no stored gradients.
+    let all = FeatureSet::all().without(Feature::StoredGradients);
     use Resource::{Atlas, AtlasSampler, Beams, Frame, Index, Knots, Light, Occupancy, Picture};
     let of_general = [Frame, Atlas, AtlasSampler, Index, Knots, Picture, Occupancy, Beams, Light];
     assert_eq!(resources(&march(all, rule)), of_general);
@@ -180,13 +190,13 @@ fn what_a_scene_does_not_need_is_left_out() {
 
     let general = march(all, rule);
     // Light looks values up.
-    let unlit = all.without(Feature::Light).without(Feature::LightBesideEye);
+    let unlit = unlit(all);
     let of_blocks = |features| {
         let mut variant = Variant::new(features, rule, Entry::March);
         variant.field = FieldKind::Blocks(Join::Blend(Interblock::MaximumDistance));
         compile(&variant)
     };
-    for feature in Feature::ALL.into_iter().filter(|f| *f != Feature::HardwareFilter) {
+    for feature in all.iter().filter(|f| *f != Feature::HardwareFilter) {
         let (with, without) = match feature {
             Feature::ShortBlocks => {
                 let features = all.without(Feature::SkipMacrocells);

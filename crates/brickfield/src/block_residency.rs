@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use brickfield_bricks::{BlockSource, FetchError, SourceId, greatest_spread};
+use brickfield_bricks::{BlockSource, FetchError, SourceId, greatest_gradient, greatest_spread};
 use brickfield_core::glam::UVec3;
 use brickfield_core::{BlockLayout, BlockSide, Companion, Level};
 use brickfield_frame::{
@@ -309,6 +309,7 @@ impl HeldCompanions {
         }
         let (format, decode) = match companion {
             Companion::Spread => (SampleFormat::Unorm8, Decode { scale: greatest_spread(source), offset: 0.0 }),
+            Companion::Gradient => (SampleFormat::Unorm8x4, Decode { scale: greatest_gradient(source), offset: 0.0 }),
         };
         let slots = field.slots().companions(format, decode, self.chunks.clone(), self.ones.clone());
         let slots = slots.expect("companions fill the places of samples");

@@ -2,8 +2,9 @@
 
 use brickfield_bricks::{BlockSource, FetchError};
 use brickfield_core::glam::UVec3;
-use brickfield_core::{Aabb, BlockLayout, BlockSide, Level, Projection, TransferFunction, ValueRange};
+use brickfield_core::{Aabb, BlockLayout, BlockSide, Companion, Level, Projection, TransferFunction, ValueRange};
 use brickfield_frame::{Drawing, FramePlan, IndexEntry, Join, Lighting, PlanError, PlanParts};
+use brickfield_optics::Normals;
 use rayon::prelude::*;
 
 use crate::course::{Course, segment_reach, to_sample_space};
@@ -68,7 +69,7 @@ pub fn prepare_blocks(
     check_levels(source.layout(), levels)?;
     let coarsest = levels.iter().copied().max().unwrap_or(Level(0));
     let Course { domain, sampling, rays } = Course::new(source.grid(), scene, coarsest)?;
-    residency.hold(source, levels, &[])?;
+    residency.hold(source, levels, companions(scene))?;
     let style = match scene.quality {
         Quality::Final => style,
         Quality::Draft => BlockStyle { join: Join::Shared, ..style },
@@ -84,6 +85,14 @@ pub fn prepare_blocks(
     let parts = PlanParts::new(field, rays, domain, sampling, scene.transfer.clone());
     let lighting = scene.light.map(|light| Lighting::new(light, source.grid()));
     Ok(FramePlan::new(PlanParts { lighting, drawing, ..parts })?)
+}
+
+/// The companions of samples that a frame needs.
+fn companions(scene: &Scene) -> &'static [Companion] {
+    match scene.light.map(|light| light.normals()) {
+        Some(Normals::Stored) => &[Companion::Gradient],
+        _ => &[],
+    }
 }
 
 fn check_levels(layout: &BlockLayout, levels: &[Level]) -> Result<(), PrepareBlocksError> {

@@ -311,7 +311,7 @@ fn whole(plan: &SpoiltPlan) -> Aabb {
 /// One brick whose samples all have the greatest stored value, everywhere.
 fn show_ghosts(plan: &mut SpoiltPlan) {
     let sample: &[u8] = match plan.slots.format() {
-        SampleFormat::Unorm8 | SampleFormat::Unorm16 => &[0xff],
+        SampleFormat::Unorm8 | SampleFormat::Unorm8x4 | SampleFormat::Unorm16 => &[0xff],
         SampleFormat::Float32 => &[0, 0, 0x80, 0x3f],
     };
     let bytes: Vec<u8> = sample.iter().copied().cycle().take(plan.slots.chunk_bytes()).collect();

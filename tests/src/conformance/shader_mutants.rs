@@ -216,16 +216,28 @@ mutants! {
     /// Pre-integrated segments have the shade of their near end.
     NEAR_SHADE_ALONE: "near-shade-alone", "light", "between", "0.5 * (near.factor + far.factor)" => "near.factor";
     /// Gradients do not ask the next brick.
-    GRADIENT_OF_ONE_PATCH: "gradient-of-one-patch", "gradient", "beside", "all(p >= area.region.low) && all(p < area.region.high)"
+    GRADIENT_OF_ONE_PATCH: "gradient-of-one-patch", "gradient/central", "beside", "all(p >= area.region.low) && all(p < area.region.high)"
         => "true";
     /// Slopes are over two steps, even where the volume ends.
-    SLOPE_OVER_TWO_STEPS: "slope-over-two-steps", "gradient", "slope", "dot(behind.at - before.at, vec3f(1.0))"
+    SLOPE_OVER_TWO_STEPS: "slope-over-two-steps", "gradient/central", "slope", "dot(behind.at - before.at, vec3f(1.0))"
         => "2.0 * dot(way, vec3f(1.0))";
     /// Gradients of coarse bricks are taken from neighbouring voxels.
     SPACING_OF_LEVEL_0: "spacing-of-level-0", "field/bricks", "spacing_at", "return 1.0 / area.scale;" => "return 1.0;";
     /// Gradients between blocks are taken over the spacing of one of them.
     SPACING_OF_OWN_BLOCK: "spacing-of-own-block", "field/blocks", "spacing_at",
         "dot(weights.low, strides.low) + dot(weights.high, strides.high)" => "area.samples.stride";
+    /// The root of a stored gradient's length is its length.
+    STORED_LENGTH_NOT_SQUARED: "stored-length-not-squared", "gradient/stored", "gradient_at", "codes.w * codes.w" => "codes.w";
+    /// Stored directions have no negative components.
+    STORED_DIRECTION_UNSIGNED: "stored-direction-unsigned", "gradient/stored", "gradient_at", "(codes.xyz * 255.0 - ZERO) / ZERO"
+        => "codes.xyz";
+    /// Blocks of one sample have no gradient.
+    ONE_GRADIENT_FORGOTTEN: "one-gradient-forgotten", "field/blocks", "codes_among",
+        "unpack4x8unorm(one_gradients[cell_number(cell)])" => "vec4f(0.0)";
+    /// Stored gradients are of the nearest block alone.
+    STORED_ACROSS_BLOCKS: "stored-across-blocks", "field/blocks", "codes_at",
+        "sum += weight * codes_among(samples_of(cell, blocks[cell_number(cell)]), cell, p);"
+        => "sum += weight * codes_among(area.samples, area.cell, p);";
     /// Opacity is the depth.
     OPACITY_IS_DEPTH: "opacity-is-depth", "march", "march", "vec4f(seen.rgb, alpha(seen.w))" => "vec4f(seen.rgb, min(seen.w, 1.0))";
 }

@@ -49,7 +49,8 @@ fn code(gradient: DVec3, greatest: f64) -> [u8; 4] {
 }
 
 fn voxels_of(extent: UVec3) -> impl Iterator<Item = UVec3> {
-    (0..extent.element_product()).map(move |i| UVec3::new(i % extent.x, i / extent.x % extent.y, i / (extent.x * extent.y)))
+    (0..extent.element_product())
+        .map(move |i| UVec3::new(i % extent.x, i / extent.x % extent.y, i / (extent.x * extent.y)))
 }
 
 /// The data values of a block's voxels and one beyond on every side: at the volume's faces the outer voxels again.

@@ -11,5 +11,7 @@ mod volume;
 
 pub use build::{BlockBuildError, BlockOptions, block_summaries, build_blocks};
 pub use memory::{BlockMemory, BlockTally, block_memory};
-pub use source::{BlockSource, FetchError, NoCompanion, NoSuchBlock, SourceId, fetch_values, greatest_gradient, greatest_spread};
+pub use source::{
+    BlockSource, FetchError, NoCompanion, NoSuchBlock, SourceId, fetch_values, greatest_gradient, greatest_spread,
+};
 pub use volume::BlockVolume;

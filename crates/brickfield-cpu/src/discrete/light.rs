@@ -10,12 +10,13 @@
 //! **Directions.** The direction to a near light is off by the position's error over the distance; the half vector by that over
 //! |l + v|, which is small where the light is behind.
 
+use brickfield_core::GRADIENT_ZERO;
 use brickfield_core::glam::{DMat3, DVec3};
 use brickfield_frame::{FramePlan, Lighting, PlanRay};
 use brickfield_optics::{LightSource, Shade};
 
 use super::ambiguity::cells;
-use super::field::{FieldReader, Patch};
+use super::field::{Code, FieldReader, Patch};
 
 /// The value at a node, and the light there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,8 +65,7 @@ pub(super) fn brightness(plan: &FramePlan) -> f64 {
 
 /// The shade at position `p` of a patch, which is not empty, on a ray.
 pub(super) fn shade(field: &impl FieldReader, lighting: &Lighting, patch: &Patch, p: DVec3, ray: &PlanRay) -> Shade {
-    let slope = pairs(field, patch, p).map(|pair| slope(&pair));
-    let gradient = lighting.gradient_to_world() * DVec3::from(slope);
+    let gradient = lighting.gradient_to_world() * slope(field, patch, p);
     let to_eye = to_eye(lighting, ray);
     lighting.light.shade(gradient, lighting.to_light(p, to_eye), to_eye)
 }
@@ -73,7 +73,8 @@ pub(super) fn shade(field: &impl FieldReader, lighting: &Lighting, patch: &Patch
 /// How much the shade may change, of the factor and the highlight together, because f32 takes values beside a node at a position off by
 /// `delta` from another patch, where the field jumps.
 pub(super) fn shade_jump(field: &impl FieldReader, patch: &Patch, p: DVec3, ray: &PlanRay, delta: DVec3) -> f64 {
-    let Some(lighting) = field.plan().lighting() else { return 0.0 };
+    // A stored gradient is of the node's own blocks.
+    let Some(lighting) = field.plan().lighting().filter(|_| field.plan().gradients().is_none()) else { return 0.0 };
     let ends = |b: &Beside| (field.cell_at(b.at - delta), field.cell_at(b.at + delta));
     let is_near_face = |b: &Beside| {
         let (low, high) = ends(b);
@@ -87,23 +88,35 @@ pub(super) fn shade_jump(field: &impl FieldReader, patch: &Patch, p: DVec3, ray:
         let others = cells(low, high).filter_map(|cell| field.value(&field.lit_patch_of(cell), b.at));
         others.map(|other| (other - b.value).abs()).fold(0.0, f64::max)
     };
-    let error = shade_error(field, lighting, (patch, p, ray), delta, jump);
+    let error =
+        shade_error(field, lighting, (patch, p, ray), delta, ValueError { of_value: jump, of_code: |_: &Code| 0.0 });
     error.factor + error.highlight
 }
 
-/// How far the shade may be off if values beside the node are off by `error`, and positions by `delta`.
+/// How far the numbers of a gradient may be off: the values beside a node, in data values, or the numbers of a stored gradient.
+pub(super) struct ValueError<V, C> {
+    pub(super) of_value: V,
+    pub(super) of_code: C,
+}
+
+/// How far the shade may be off if the numbers of the gradient are off by `error`, and positions by `delta`.
 pub(super) fn shade_error(
     field: &impl FieldReader,
     lighting: &Lighting,
     (patch, p, ray): (&Patch, DVec3, &PlanRay),
     delta: DVec3,
-    error: impl Fn(&Beside) -> f64,
+    error: ValueError<impl Fn(&Beside) -> f64, impl Fn(&Code) -> f64>,
 ) -> Shade {
-    let pairs = pairs(field, patch, p);
     let map = lighting.gradient_to_world() * lighting.light.flat_below().recip();
-    let steepness = (map * DVec3::from(pairs.map(|pair| slope(&pair)))).length();
-    let error = pairs.map(|pair| over_distance(&pair, pair.iter().map(&error).sum()));
-    let off = (magnitudes(map) * DVec3::from(error)).length() + COSINE * steepness;
+    let steepness = (map * slope(field, patch, p)).length();
+    let error = match field.plan().gradients() {
+        Some(_) => stored_error(field, patch, p, delta, error.of_code),
+        None => {
+            let of_pair = |pair: [Beside; 2]| over_distance(&pair, pair.iter().map(&error.of_value).sum());
+            DVec3::from(pairs(field, patch, p).map(of_pair))
+        }
+    };
+    let off = (magnitudes(map) * error).length() + COSINE * steepness;
     let strength = steepness / steepness.hypot(1.0);
     let normal = (off / (steepness - off).max(0.0).hypot(1.0)).min(2.0);
     let (to_light, halfway) = direction_errors(lighting, p, ray, delta);
@@ -134,8 +147,44 @@ fn beside(field: &impl FieldReader, own: &Patch, q: DVec3) -> Beside {
     Beside { at, patch: *own, value: field.value(own, at).expect("a node of a patch that is not empty") }
 }
 
-fn slope(pair: &[Beside; 2]) -> f64 {
-    over_distance(pair, pair[1].value - pair[0].value)
+/// Data values per voxel along the grid's axes at position `p` of a patch.
+fn slope(field: &impl FieldReader, patch: &Patch, p: DVec3) -> DVec3 {
+    match field.plan().gradients() {
+        Some(_) => stored(field, field.codes(patch, field.clamped(p)).map(|code| code.value)),
+        None => DVec3::from(pairs(field, patch, p).map(|pair| over_distance(&pair, pair[1].value - pair[0].value))),
+    }
+}
+
+/// A stored gradient in data values per voxel (`brickfield_core::Companion::Gradient`).
+fn stored(field: &impl FieldReader, [x, y, z, length]: [f64; 4]) -> DVec3 {
+    let plan = field.plan();
+    let (Some(gradients), Some(lighting)) = (plan.gradients(), plan.lighting()) else { return DVec3::ZERO };
+    let zero = f64::from(GRADIENT_ZERO);
+    let direction = (DVec3::new(x, y, z) * 255.0 - zero) / zero;
+    direction * length * length * gradients.decode().scale * lighting.spacing()
+}
+
+/// How far a stored gradient may be off, in data values per voxel: by looking beside the position, and by what each of its numbers may be
+/// off.
+fn stored_error(
+    field: &impl FieldReader,
+    patch: &Patch,
+    p: DVec3,
+    delta: DVec3,
+    of_codes: impl Fn(&Code) -> f64,
+) -> DVec3 {
+    let codes = field.codes(patch, field.clamped(p));
+    let here = stored(field, codes.map(|code| code.value));
+    let off = |there: DVec3| (there - here).abs();
+    let beside = |way: DVec3| off(stored(field, field.codes(patch, field.clamped(p + way)).map(|code| code.value)));
+    let along = |axis: DVec3| beside(axis * delta).max(beside(-axis * delta));
+    let moved: DVec3 = DVec3::AXES.into_iter().map(along).sum();
+    let of_code = |i: usize| {
+        let mut spoilt = codes.map(|code| code.value);
+        spoilt[i] += of_codes(&codes[i]);
+        off(stored(field, spoilt))
+    };
+    moved + (0..4).map(of_code).sum::<DVec3>()
 }
 
 /// A difference over the distance of its values; 0 where there is one sample.

@@ -27,8 +27,8 @@ use brickfield_optics::transmittance;
 use rayon::prelude::*;
 
 use super::change::{Nodes, spread};
-use super::field::{Around, FieldReader, Patch, Work, with_field};
-use super::light::{Beside, Node, shade_error};
+use super::field::{Around, Code, FieldReader, Patch, Work, with_field};
+use super::light::{Beside, Node, ValueError, shade_error};
 use super::walk::{CutSegment, clip, parts};
 use super::{part_nodes, relative};
 
@@ -38,6 +38,8 @@ const AT_WORST: f64 = 8.0;
 const CODES: f64 = 1.5;
 /// Roundings of a value between samples: of numbers of the value scale, which are below 4.
 const OF_VALUE: f64 = 4.0 / (1u32 << 24) as f64;
+/// Roundings of a number of a stored gradient, which is at most 1.
+const OF_CODE: f64 = 8.0 / (1u32 << 24) as f64;
 /// Extinction and colour are extreme at the candidates; of wide ranges their product may pass its ends by second order.
 const SECOND_ORDER: f64 = 1.05;
 
@@ -87,6 +89,10 @@ fn of_pixel(field: &impl FieldReader, at: UVec2, cause: Cause) -> f64 {
         Cause::Positions => field.gain() * field.moved(patch, q, delta),
         Cause::Filter { sub_texel_bits } => filtered(field, field.gain() * around.widest, sub_texel_bits),
     };
+    let code = |code: &Code| match cause {
+        Cause::Positions => 0.0,
+        Cause::Filter { sub_texel_bits } => filtered_code(code, sub_texel_bits),
+    };
     let (mut bound, mut least_depth) = (0.0, 0.0);
     for part in parts(plan, ray, span) {
         let position = |x: &f64| plan.rays().center + ray.at(part.at(*x));
@@ -94,7 +100,7 @@ fn of_pixel(field: &impl FieldReader, at: UVec2, cause: Cause) -> f64 {
         let rule = plan.sampling().rule();
         let of = |(x, own): (&f64, Option<Node>)| nodes(field, (part, own), position(x), stray);
         let nodes: Vec<Nodes> = rule.nodes().iter().zip(own).map(of).collect();
-        let shade = |x: &f64| shade_off(field, ray, (part, position(x)), delta, stray);
+        let shade = |x: &f64| shade_off(field, ray, (part, position(x)), delta, stray, code);
         let shade_error = || rule.nodes().iter().map(shade).fold(0.0, f64::max);
         let (change, least) = spread(plan, &nodes, part, shade_error);
         bound += transmittance(least_depth) * change;
@@ -110,6 +116,12 @@ fn filtered(field: &impl FieldReader, range: f64, bits: u32) -> f64 {
     let code = if by_code { CODES * field.gain() } else { 0.0 };
     // Interpolation never leaves the cell's range by more than a code.
     (weights + code).min(range + code)
+}
+
+/// How far filtering may move a number of a stored gradient: as it does a value of 8 bits.
+fn filtered_code(code: &Code, bits: u32) -> f64 {
+    let by_code = if bits < f32::MANTISSA_DIGITS - 1 { CODES / 255.0 } else { 0.0 };
+    (3.0 * (-f64::from(bits)).exp2() * code.widest).min(code.widest) + by_code
 }
 
 /// What a node at `p` may be; none where its block is empty. `stray` says how far the value may move, in data values.
@@ -134,6 +146,7 @@ fn shade_off(
     (part, p): (CutSegment, DVec3),
     delta: DVec3,
     stray: impl Fn(&Patch, DVec3, &Around) -> f64,
+    filtered_code: impl Fn(&Code) -> f64,
 ) -> f64 {
     let Some(lighting) = field.plan().lighting() else { return 0.0 };
     let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(p)));
@@ -143,6 +156,8 @@ fn shade_off(
     let rounding = OF_VALUE * field.plan().value_scale().unit();
     let error =
         |b: &Beside| rounding + field.around(&b.patch, b.at).map_or(0.0, |around| stray(&b.patch, b.at, &around));
+    let of_code = |code: &Code| OF_CODE + filtered_code(code);
+    let error = ValueError { of_value: error, of_code };
     let off = shade_error(field, lighting, (&patch, p, ray), delta, error);
     off.factor + off.highlight
 }

@@ -1,5 +1,6 @@
-//! Light in f32: the gradient of the field by central differences, and the shade of a node.
+//! Light in f32: the gradient of the field, by central differences or stored, and the shade of a node.
 
+use brickfield_core::GRADIENT_ZERO;
 use brickfield_core::glam::{DVec3, Mat3, UVec3, Vec3};
 use brickfield_frame::{Field, Join, Lighting, Places, PlanRay};
 use brickfield_interp::Neighbourhood;
@@ -13,6 +14,8 @@ pub(super) struct Lamp<'a> {
     lighting: &'a Lighting,
     /// From numbers of the value scale per voxel to the world's gradient in units of the light's `flat_below`.
     steepness: Mat3,
+    /// Numbers of the value scale per voxel along each axis that the greatest stored gradient stands for.
+    greatest_slope: Vec3,
 }
 
 /// Of a colour the factor, and the highlight that is added.
@@ -29,14 +32,24 @@ impl<'a> Lamp<'a> {
     /// The light of a renderer's plan.
     pub(super) fn of(renderer: &'a impl Renderer) -> Option<Lamp<'a>> {
         let lighting = renderer.plan().lighting()?;
-        let per_number = renderer.plan().value_scale().unit() / lighting.light.flat_below();
-        Some(Lamp { lighting, steepness: (lighting.gradient_to_world() * per_number).as_mat3() })
+        let (plan, unit) = (renderer.plan(), renderer.plan().value_scale().unit());
+        let per_number = unit / lighting.light.flat_below();
+        let greatest = plan.gradients().map_or(0.0, |gradients| gradients.decode().scale / unit);
+        Some(Lamp {
+            lighting,
+            steepness: (lighting.gradient_to_world() * per_number).as_mat3(),
+            greatest_slope: (lighting.spacing() * greatest).as_vec3(),
+        })
     }
 
     /// The shade at position `p` of the block around an index cell, on a ray.
     pub(super) fn shade(&self, renderer: &impl Renderer, cell: UVec3, p: DVec3, ray: &PlanRay) -> Shade32 {
         let steepest = Vec3::splat(STEEPEST);
-        let gradient = (self.steepness * gradient(renderer, cell, p)).clamp(-steepest, steepest);
+        let slope = match renderer.plan().gradients() {
+            Some(_) => stored(renderer.codes(cell, p), self.greatest_slope),
+            None => central(renderer, cell, p),
+        };
+        let gradient = (self.steepness * slope).clamp(-steepest, steepest);
         let square = gradient.length_squared();
         let normal = gradient * -square.max(1e-30).sqrt().recip();
         let to_eye = -(self.lighting.sample_to_world.matrix3 * ray.direction);
@@ -79,8 +92,15 @@ impl Shade32 {
     }
 }
 
-/// Numbers of the value scale per voxel at position `p` of the block around an index cell.
-fn gradient(renderer: &impl Renderer, cell: UVec3, p: DVec3) -> Vec3 {
+/// Numbers of the value scale per voxel of a stored gradient (`brickfield_core::Companion::Gradient`).
+fn stored([x, y, z, length]: [f32; 4], greatest_slope: Vec3) -> Vec3 {
+    let zero = f32::from(GRADIENT_ZERO);
+    let direction = (Vec3::new(x, y, z) * 255.0 - zero) / zero;
+    direction * (length * length) * greatest_slope
+}
+
+/// Numbers of the value scale per voxel at position `p` of the block around an index cell, by central differences.
+fn central(renderer: &impl Renderer, cell: UVec3, p: DVec3) -> Vec3 {
     let field = renderer.plan().field();
     let clamped = |q: DVec3| q.clamp(DVec3::ZERO, field.last_sample());
     let q = clamped(p);

@@ -116,6 +116,11 @@ trait Renderer: Sync {
         self.value_in(cell, q)
     }
 
+    /// The stored gradient of the block around an index cell at a sample position: its four numbers, 0 to 1. 0 where a plan has none.
+    fn codes(&self, _cell: UVec3, _q: DVec3) -> [f32; 4] {
+        [0.0; 4]
+    }
+
     /// The pixel of a ray, of which some runs of segments may see something, front to back.
     fn pixel(&self, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4];
 }
@@ -153,6 +158,7 @@ fn dispatch<W: Work>(plan: &FramePlan, work: W) -> W::Output {
         SampleFormat::Unorm8 => dispatch_side::<Unorm8, W>(plan, work),
         SampleFormat::Unorm16 => dispatch_side::<Unorm16, W>(plan, work),
         SampleFormat::Float32 => dispatch_side::<Float32, W>(plan, work),
+        SampleFormat::Unorm8x4 => unreachable!("values are single numbers"),
     }
 }
 

@@ -76,6 +76,35 @@ impl<S: Stored> Renderer for PlacedPlan<'_, S> {
         }
     }
 
+    fn codes(&self, cell: UVec3, q: DVec3) -> [f32; 4] {
+        let field = self.plan.field();
+        let q = q.clamp(DVec3::ZERO, field.last_sample());
+        let (Some(gradients), Places::Blocks(places)) = (self.plan.gradients(), field.slots().places()) else {
+            return [0.0; 4];
+        };
+        let layout = places.layout();
+        let of_block = |block: UVec3, channel: usize| {
+            let slot = layout.ordinal(block) as u32;
+            match gradients.samples(slot) {
+                Some(codes) => {
+                    trilinear(&places.place(block), q, |i| f32::from(codes.bytes()[4 * i + channel])) / 255.0
+                }
+                None => {
+                    let word = gradients.one_sample(slot).unwrap_or_default() as u32;
+                    f32::from(word.to_le_bytes()[channel]) / 255.0
+                }
+            }
+        };
+        std::array::from_fn(|channel| match field.join() {
+            Join::Blend(scheme) => {
+                let level = |block| places.row(block).level;
+                let fetch = |block| f64::from(of_block(block, channel));
+                interpolate(layout, scheme, q.to_array(), level, fetch) as f32
+            }
+            _ => of_block(cell, channel),
+        })
+    }
+
     fn pixel(&self, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
         single::pixel(self, ray, runs)
     }

@@ -1,7 +1,7 @@
 //! Options of light.
 
 use brickfield_core::{Grid, ValueRange};
-use brickfield_optics::{Light, LightError, LightSource, LightTerms, LitSides, flat_below};
+use brickfield_optics::{Light, LightError, LightSource, LightTerms, LitSides, Normals, flat_below};
 use clap::Args;
 
 use super::{OptionError, values};
@@ -32,6 +32,11 @@ pub struct LightOptions {
     /// The sides of surfaces that are lit: lower (of lower values) or both
     #[arg(long, value_name = "WHICH", requires = "light", default_value = "lower", value_parser = values::lit_sides)]
     pub lit_sides: LitSides,
+    /// Normals of surfaces: central (differences of values) or stored (gradients computed before, four bytes a sample more; with
+    /// --blocks)
+    #[arg(long, value_name = "WHICH", requires = "light", requires_if("stored", "blocks"), default_value = "central",
+          value_parser = values::normals)]
+    pub normals: Normals,
 }
 
 impl LightOptions {
@@ -57,6 +62,6 @@ impl LightOptions {
         let LightOptions { ambient, diffuse, specular, shininess, .. } = *self;
         let terms = LightTerms { ambient, diffuse, specular, shininess };
         let light = Light::new(source, terms, self.flat_below.unwrap_or(flat_below))?;
-        Ok(Some(light.on_sides(self.lit_sides)))
+        Ok(Some(light.on_sides(self.lit_sides).on_normals(self.normals)))
     }
 }

@@ -7,7 +7,7 @@ use brickfield_core::{Aabb, BlockSide, BrickSide, Interblock, Level, ScalarType,
 use brickfield_frame::{Division, Join, Lengths, Mode, Placement, Target};
 use brickfield_io::{ByteOrder, RawSpec};
 use brickfield_lod::Criterion;
-use brickfield_optics::{LightSource, LitSides, QuadratureRule};
+use brickfield_optics::{LightSource, LitSides, Normals, QuadratureRule};
 
 use super::{Background, Boxes};
 use crate::{MAX_IMAGE, Quality, TransparentBlocks};
@@ -92,6 +92,11 @@ pub fn light(text: &str) -> Result<LightSource, String> {
 /// The sides of surfaces that are lit.
 pub fn lit_sides(text: &str) -> Result<LitSides, String> {
     named(&[("lower", LitSides::Lower), ("both", LitSides::Both)], text)
+}
+
+/// Where normals come from.
+pub fn normals(text: &str) -> Result<Normals, String> {
+    named(&[("central", Normals::Central), ("stored", Normals::Stored)], text)
 }
 
 /// Draft or final.

@@ -53,7 +53,7 @@ fn random(setup: Setup, side: BlockSide, join: Join) -> Setup {
 }
 
 pub(super) fn cases() -> Vec<Case> {
-    [bricks(), levels(), blocks(), extremes()].into_iter().flatten().collect()
+    [bricks(), levels(), blocks(), stored(), extremes()].into_iter().flatten().collect()
 }
 
 fn bricks() -> Vec<Case> {
@@ -209,6 +209,54 @@ fn blocks() -> Vec<Case> {
         }),
         picture("light/blocks-all-of-level-2", catches![shader::NEAREST, FlatBelowScaled], move || {
             equal(lit(u16, beside(&grid())), 2, MaximumDistance)
+        }),
+    ]
+}
+
+/// Normals of gradients that lie beside the samples.
+fn stored() -> Vec<Case> {
+    let (u8, u16, f32) = (ScalarType::U8, ScalarType::U16, ScalarType::F32);
+    use Interblock::{BoundarySplit, MaximumDistance};
+    let equal = |setup: Setup, level| {
+        let style = BlockStyle { join: Join::Blend(MaximumDistance), transparent: TransparentBlocks::Blended };
+        setup.blocks(BlockSide::V8, FlatLevels::All(Level(level)), style).stored_normals()
+    };
+    vec![
+        picture("light/stored-nearest", catches![shader::STORED_LENGTH_NOT_SQUARED, DiffuseDimmed], move || {
+            random(lit(u8, LightSource::Head), BlockSide::V8, Join::Shared).stored_normals()
+        }),
+        picture(
+            "light/stored-maximum-distance-gauss2",
+            catches![
+                shader::ONE_GRADIENT_FORGOTTEN,
+                shader::STORED_DIRECTION_UNSIGNED,
+                shader::MAXIMUM_TO_THE_FACE,
+                FlatBelowScaled
+            ],
+            move || {
+                let setup = lit(u16, beside(&grid())).rule(QuadratureRule::Gauss2);
+                random(setup, BlockSide::V8, Join::Blend(MaximumDistance)).stored_normals()
+            },
+        ),
+        picture(
+            "light/stored-boundary-split-skew-pre-integrated",
+            catches![shader::STORED_ACROSS_BLOCKS, shader::NORMAL_OF_THE_GRID, LightTurned],
+            move || {
+                let setup = skewed(f32, ASIDE).rule(QuadratureRule::PreIntegrated);
+                random(setup, BlockSide::V16, Join::Blend(BoundarySplit)).stored_normals()
+            },
+        ),
+        picture("light/stored-equal", catches![shader::STORED_LENGTH_NOT_SQUARED, shader::NEAREST], move || {
+            equal(skewed(u16, ASIDE), 0)
+        }),
+        picture("light/stored-all-of-level-1", catches![shader::STORED_DIRECTION_UNSIGNED], move || {
+            equal(lit(u8, LightSource::Head).parallel(DVec3::new(-0.5, 0.8, -0.3), 50.0), 1)
+        }),
+        picture("light/stored-all-of-one-sample", catches![shader::STORED_LENGTH_NOT_SQUARED], move || {
+            equal(lit(u16, LightSource::Head), 3)
+        }),
+        picture("light/stored-fast", catches![RedBlueSwapped, RowsFlipped], move || {
+            equal(lit(f32, LightSource::Head), 0).with(|s| s.mode = Mode::FAST)
         }),
     ]
 }

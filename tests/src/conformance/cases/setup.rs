@@ -9,7 +9,7 @@ use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{
     Aabb, BlockLayout, BlockSide, BrickSide, Camera, Level, Projection, ScalarType, TransferFunction, Volume,
 };
-use brickfield_optics::{Light, LightSource, LightTerms, QuadratureRule, flat_below};
+use brickfield_optics::{Light, LightSource, LightTerms, Normals, QuadratureRule, flat_below};
 
 use super::super::case::{Case, Check, FlatBlocks, Mutant, NoData, Oracle, PictureTest, Shows};
 use super::super::storage::Storage;
@@ -113,6 +113,12 @@ impl Setup {
         let flat_below = flat_below(self.volume.range(), self.volume.grid().spacing().min_element());
         let light = Light::new(source, terms, flat_below).expect("a case's light is one");
         self.with(|s| s.light = Some(light))
+    }
+
+    /// On normals of stored gradients, of which the volume's own samples know nothing; for flat blocks.
+    pub(super) fn stored_normals(self) -> Setup {
+        let setup = self.with(|s| s.light = s.light.map(|light| light.on_normals(Normals::Stored)));
+        Setup { oracle: OracleKind::None, ..setup }
     }
 
     /// Surfaces begin at another gradient.
