@@ -31,21 +31,22 @@ pub(super) fn gradient_codes<T: Scalar>(
     for voxel in voxels_of(extent) {
         let sample = voxel / level.stride();
         let sum = &mut sums[(sample.x + n.x * (sample.y + n.y * sample.z)) as usize];
-        *sum = (sum.0 + around.gradient(voxel) / volume.grid.spacing(), sum.1 + 1);
+        // Parts of the greatest: whatever the values are, squares are finite.
+        *sum = (sum.0 + around.gradient(voxel) / volume.grid.spacing() / greatest, sum.1 + 1);
     }
-    sums.into_iter().flat_map(|(sum, count)| code(sum / f64::from(count), greatest)).collect()
+    sums.into_iter().flat_map(|(sum, count)| code(sum / f64::from(count))).collect()
 }
 
-/// A gradient along the grid's axes, in data values per world unit, as four bytes.
-fn code(gradient: DVec3, greatest: f64) -> [u8; 4] {
+/// A gradient along the grid's axes, in parts of the greatest, as four bytes.
+fn code(gradient: DVec3) -> [u8; 4] {
     let length = gradient.length();
-    // No gradient, or a range of 0.
-    if !(length > 0.0 && greatest > 0.0) {
+    // Neither has a direction: no gradient, and where all values are equal, 0 of 0.
+    if length.is_nan() || length == 0.0 {
         return [GRADIENT_ZERO, GRADIENT_ZERO, GRADIENT_ZERO, 0];
     }
     let zero = f64::from(GRADIENT_ZERO);
     let [x, y, z] = (gradient / length).to_array().map(|c| (c * zero + zero).round() as u8);
-    [x, y, z, ((length / greatest).min(1.0).sqrt() * 255.0).round() as u8]
+    [x, y, z, (length.min(1.0).sqrt() * 255.0).round() as u8]
 }
 
 fn voxels_of(extent: UVec3) -> impl Iterator<Item = UVec3> {
