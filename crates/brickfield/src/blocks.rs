@@ -187,9 +187,11 @@ fn back_to_front(source: &dyn BlockSource, scene: &Scene, drawn: &[bool]) -> Vec
 mod tests {
     use std::sync::Arc;
 
-    use brickfield_bricks::{BlockOptions, BlockVolume, build_blocks};
+    use brickfield_bricks::{BlockOptions, BlockVolume, BuildOptions, build_blocks, build_tree};
     use brickfield_core::glam::{DVec3, UVec2};
     use brickfield_core::{Camera, Grid, Interblock, Knot, Volume};
+    use brickfield_frame::Feature;
+    use brickfield_optics::{Light, LightSource, LightTerms};
     use proptest::prelude::*;
 
     use super::*;
@@ -220,6 +222,26 @@ mod tests {
             Some(chunk) => chunk.bytes().to_vec(),
             None => (slots.one_sample(i as u32).unwrap() as u16).to_le_bytes().to_vec(),
         }
+    }
+
+    #[test]
+    fn stored_normals_bring_gradients_which_bricks_do_not_have() {
+        let source = blocks(UVec3::new(20, 17, 9));
+        let levels: Vec<Level> = (0..source.layout().n_blocks_total()).map(|i| Level(i as u8 % 4)).collect();
+        let light = Light::new(LightSource::Head, LightTerms::default(), 900.0).unwrap();
+        let on = |normals| Scene { light: Some(light.on_normals(normals)), ..scene(&source) };
+        let mut residency = BlockResidency::default();
+        let mut plan = |normals| prepare_blocks(&source, &on(normals), &levels, BLENDED, &mut residency).unwrap();
+        let n_samples = |plan: &FramePlan| plan.field().slots().n_bytes() / 2;
+        let stored = plan(Normals::Stored);
+        let gradients = stored.gradients().unwrap();
+        assert_eq!(gradients.n_bytes(), 4 * n_samples(&stored));
+        assert!(stored.features().contains(Feature::StoredGradients));
+        let central = plan(Normals::Central);
+        assert!(central.gradients().is_none() && central.field().companions(Companion::Gradient).is_none());
+        let tree = build_tree(source.volume(), &BuildOptions::default()).unwrap();
+        let refused = crate::prepare(&tree, &on(Normals::Stored), &mut crate::Residency::default());
+        assert_eq!(refused.err(), Some(PrepareError::Plan(PlanError::NoGradients)));
     }
 
     #[test]

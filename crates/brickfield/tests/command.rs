@@ -242,6 +242,9 @@ fn light_falls_on_bricks_and_on_blocks() {
         |which: &str| place.pixels(&format!("|--blocks|8|--light|place=1,-9,4|--specular|0|--lit-sides|{which}"));
     let (lower, both) = (sides("lower"), sides("both"));
     assert!(lower != both && lower.iter().zip(&both).all(|(a, b)| a <= b));
+    let stored = place.pixels("|--blocks|8|--light|place=1,-9,4|--specular|0|--normals|stored");
+    let differences = || stored.iter().zip(&lower).map(|(a, b)| a.abs_diff(*b));
+    assert!(stored != lower && differences().all(|d| d < 128), "{:?}", differences().max());
 }
 
 #[test]
@@ -274,7 +277,7 @@ fn bricks_that_show_nothing_are_boxes_only_if_all_are_asked_for() {
 }
 
 /// Arguments after `render`, the status, and what the message must hold.
-const REFUSED: [(&str, i32, &str); 45] = [
+const REFUSED: [(&str, i32, &str); 46] = [
     ("b.nrrd|-o|a.png", 1, "b.nrrd"),
     ("a.nrrd|-o|a.jpg", 2, "a.jpg: pictures are written as .exr or .png"),
     ("a.nrrd|-o|no/a.png", 2, "no/a.png: there is no folder no"),
@@ -330,6 +333,7 @@ const REFUSED: [(&str, i32, &str); 45] = [
         "a gradient of 0 data values per world unit; it must be finite and above 0",
     ),
     ("a.nrrd|-o|a.png|--light|head|--lit-sides|left", 2, "lower or both"),
+    ("a.nrrd|-o|a.png|--light|head|--normals|stored", 2, "--blocks <N>"),
     ("a.nrrd|-o|a.png|--ambient|1", 2, "--light <FROM>"),
     ("a.nrrd|-o|.|--size|8x8", 2, "exr or .png"),
     ("a.nrrd|-o|a.png|--raw|99x99x99,u8", 1, "a.nrrd"),

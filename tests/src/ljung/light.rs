@@ -13,7 +13,7 @@ use brickfield::lod::{BlockLevels, Criterion};
 use brickfield::{BlockResidency, BlockStyle, Residency, Scene, TransparentBlocks, prepare, prepare_blocks};
 use brickfield_core::glam::{DMat3, DVec3, UVec2, UVec3};
 use brickfield_core::{BlockSide, Camera, Grid, Interblock, Knot, Level, ScalarType, TransferFunction, Volume};
-use brickfield_optics::{Light, LightSource, LightTerms};
+use brickfield_optics::{Light, LightSource, LightTerms, Normals};
 use serde::Serialize;
 
 use super::LjungArgs;
@@ -37,13 +37,26 @@ const FLAT_BELOW: f64 = 12.0;
 const UNDECIDED: f64 = 2e-3;
 /// Most that f32 may be off.
 const ROUNDING: f64 = 5e-5;
+/// Most that a normal of three bytes may be off: each of its components by 1/254, a highlight by sqrt(shininess) as much.
+const CODES: f64 = 3e-2;
 
 /// How a ball's samples are kept.
 #[derive(Clone, Copy)]
 enum Form {
     Bricks(Level),
     Blocks(Level),
+    /// Flat blocks with gradients beside their samples.
+    Stored(Level),
 }
+
+const FORMS: [Form; 6] = [
+    Form::Bricks(Level(0)),
+    Form::Bricks(Level(1)),
+    Form::Blocks(Level(0)),
+    Form::Blocks(Level(1)),
+    Form::Stored(Level(0)),
+    Form::Stored(Level(1)),
+];
 
 /// The error of a picture.
 #[derive(Clone, Debug, Serialize)]
@@ -55,38 +68,40 @@ struct LightRow {
     n_undecided: usize,
     mean: f64,
     max: f64,
+    /// Most that is allowed.
+    bound: f64,
 }
 
 pub(super) fn run(args: &LjungArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, PaperError> {
     print(&format!(
         "{} x {} x {} samples, rotated and {} : {} : {} apart, {} x {} pixels; the difference to the shade of the known normal, in any channel.\n\
          undecided: pixels with a node so near to the ball's surface that f32 may put it on either side.\n\n\
-         backend  field                    light        lit  undecided     mean      max",
+         backend  field                       light        lit  undecided     mean      max",
         DIMS.x, DIMS.y, DIMS.z, SPACING.x, SPACING.y, SPACING.z, SIZE.x, SIZE.y
     ))?;
     let ball = Ball::new()?;
     let mut rows = Vec::new();
     for (light, source) in lights(&ball.grid) {
-        for form in [Form::Bricks(Level(0)), Form::Bricks(Level(1)), Form::Blocks(Level(0)), Form::Blocks(Level(1))] {
+        for form in FORMS {
             let scene = ball.scene(form, source);
             let (plan, expected) = (ball.plan(form, &scene)?, ball.expected(form, &scene));
             for backend in &mut rivals.present {
                 let name = backend.describe().backend;
                 let frame = backend.render(&plan).map_err(|source| PaperError::Render { backend: name, source })?;
-                let row = row((name, form.name(), light), frame.image.pixels(), &expected);
+                let row = row((name, form, light), frame.image.pixels(), &expected);
                 print(&line(&row))?;
                 rows.push(row);
             }
         }
     }
     args.common.write_rows("light.json", &rows)?;
-    let missed = rows.iter().filter(|row| row.max > ROUNDING || row.n_lit == 0 || row.n_undecided > row.n_lit / 10);
+    let missed = rows.iter().filter(|row| row.max > row.bound || row.n_lit == 0 || row.n_undecided > row.n_lit / 10);
     Ok(missed.map(|row| Missed::of_pictures(format!("a lit ball: {}", line(row)))).collect())
 }
 
 fn line(row: &LightRow) -> String {
     format!(
-        "{:<8} {:<24} {:<9} {:>6} {:>10} {:>8.1e} {:>8.1e}",
+        "{:<8} {:<27} {:<9} {:>6} {:>10} {:>8.1e} {:>8.1e}",
         row.backend, row.form, row.light, row.n_lit, row.n_undecided, row.mean, row.max
     )
 }
@@ -103,13 +118,25 @@ fn lights(grid: &Grid) -> [(&'static str, LightSource); 3] {
 impl Form {
     const fn level(self) -> Level {
         match self {
-            Form::Bricks(level) | Form::Blocks(level) => level,
+            Form::Bricks(level) | Form::Blocks(level) | Form::Stored(level) => level,
         }
     }
 
     fn name(self) -> String {
-        let what = if matches!(self, Form::Bricks(_)) { "bricks" } else { "flat blocks" };
+        let what = match self {
+            Form::Bricks(_) => "bricks",
+            Form::Blocks(_) => "flat blocks",
+            Form::Stored(_) => "stored gradients",
+        };
         format!("{what} of level {}", self.level().0)
+    }
+
+    /// Most that a channel may be off.
+    const fn bound(self) -> f64 {
+        match self {
+            Form::Bricks(_) | Form::Blocks(_) => ROUNDING,
+            Form::Stored(_) => CODES,
+        }
     }
 }
 
@@ -139,7 +166,8 @@ impl Ball {
         let knot = |extinction| Knot { value: surface, extinction, color: COLOR };
         let transfer = TransferFunction::new(vec![knot(0.0), knot(1e9)]).expect("a jump");
         let camera = Camera::framing(&self.grid.world_box(), DVec3::new(0.6, -1.0, 0.35), DVec3::Z).expect("a box");
-        let light = Light::new(source, TERMS, FLAT_BELOW).expect("a light");
+        let normals = if matches!(form, Form::Stored(_)) { Normals::Stored } else { Normals::Central };
+        let light = Light::new(source, TERMS, FLAT_BELOW).expect("a light").on_normals(normals);
         let detail = vec![Criterion::Uniform(form.level())];
         Scene { light: Some(light), step_voxels: STEP_VOXELS, detail, ..Scene::new(camera, SIZE, transfer) }
     }
@@ -147,7 +175,7 @@ impl Ball {
     fn plan(&self, form: Form, scene: &Scene) -> Result<FramePlan, PaperError> {
         match form {
             Form::Bricks(_) => Ok(prepare(&self.tree, scene, &mut Residency::default())?),
-            Form::Blocks(level) => {
+            Form::Blocks(level) | Form::Stored(level) => {
                 let options = BlockOptions { side: BLOCK, ..BlockOptions::default() };
                 let blocks = build_blocks(Arc::clone(&self.volume), &options)?;
                 let levels = BlockLevels::uniform(*brickfield::bricks::BlockSource::layout(&blocks), level);
@@ -193,7 +221,7 @@ impl Ball {
         // Where the first sample lies; the variance of the voxels that a sample averages.
         let (first, variance) = match form {
             Form::Bricks(_) => (0.0, 0.0),
-            Form::Blocks(_) => (0.5 * (stride - 1.0), (stride * stride - 1.0) / 12.0),
+            Form::Blocks(_) | Form::Stored(_) => (0.5 * (stride - 1.0), (stride * stride - 1.0) / 12.0),
         };
         let s = (q - first) / stride;
         let f = s - s.floor();
@@ -220,7 +248,7 @@ impl Ball {
 }
 
 fn row(
-    (backend, form, light): (&'static str, String, &'static str),
+    (backend, form, light): (&'static str, Form, &'static str),
     found: &[[f32; 4]],
     expected: &[Expected],
 ) -> LightRow {
@@ -230,8 +258,9 @@ fn row(
     let lit: Vec<f64> = decided().filter(|(_, expected)| expected[3] > 0.0).map(difference).collect();
     LightRow {
         backend,
-        form,
+        form: form.name(),
         light,
+        bound: form.bound(),
         n_lit: lit.len(),
         n_undecided: expected.iter().filter(|pixel| pixel.is_none()).count(),
         mean: lit.iter().sum::<f64>() / lit.len().max(1) as f64,

@@ -29,7 +29,8 @@ pub struct Discrete {
     /// Linear, premultiplied RGBA.
     pub image: Image<f64>,
     /// For each pixel, rows from the top: the most by which any of its channels changes when nodes within f32 rounding of
-    /// a face between blocks of different level, or of a jump of the transfer function, fall on the other side; when a ray
+    /// a face between blocks of different level, or of a jump of the transfer function, fall on the other side; when one of the values does
+    /// that a node's gradient is made of; when a ray
     /// along a face of a block runs on its other side; when it takes the other of two stacks of planes, or one more or less middle of
     /// nominal length; 0 for pixels without any of these.
     ///

@@ -76,9 +76,11 @@ fn block_summary(subject: &BlockSubject, levels: &BlockLevels, residency: &Block
         .map(|(level, n)| format!("{n} of level {}", level.0))
         .collect();
     let slots = plan.field().slots();
+    let beside = plan.gradients().map_or(0, |gradients| gradients.n_bytes() as u64);
+    let beside = if beside > 0 { format!(", gradients {:.1} MiB", mib(beside)) } else { String::new() };
     let free = residency.n_free_texels() * slots.format().n_bytes() as u64;
     format!(
-        "flat blocks of {}: {}; {:.1}:1\nkept {:.1} MiB, {:.1} MiB of the texture free; with ghost layers {:.1} MiB (one side), {:.1} MiB (both)\n",
+        "flat blocks of {}: {}; {:.1}:1\nkept {:.1} MiB{beside}, {:.1} MiB of the texture free; with ghost layers {:.1} MiB (one side), {:.1} MiB (both)\n",
         layout.side(),
         by_level.join(", "),
         memory.ratio(),
