@@ -7,10 +7,12 @@ use std::sync::Arc;
 
 use brickfield_bricks::{
     BlockBuildError, BlockOptions, BlockSource, BlockVolume, NoSuchBlock, block_memory, build_blocks, fetch_values,
+    greatest_gradient, greatest_spread,
 };
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{
-    BlockLayout, BlockSide, BlockSummary, Grid, Level, N_BLOCK_BINS, Rescale, ScalarType, ValueRange, Volume, Voxels,
+    BlockLayout, BlockSide, BlockSummary, Companion, Grid, Level, N_BLOCK_BINS, Rescale, ScalarType, ValueRange,
+    Volume, Voxels,
 };
 use noise::{index, noise, points, volume};
 use proptest::prelude::*;
@@ -22,6 +24,38 @@ fn blocks(volume: &Volume, side: BlockSide) -> BlockVolume {
 fn all(layout: &BlockLayout) -> impl Iterator<Item = (UVec3, Level)> {
     let side = layout.side();
     layout.blocks().flat_map(move |block| side.levels().map(move |level| (block, level)))
+}
+
+/// The gradient at a voxel along the grid's axes, in data values per world unit; beyond the volume's faces its outer voxels are repeated.
+fn sobel(volume: &Volume, i: usize) -> DVec3 {
+    let dims = volume.grid().dims().as_ivec3();
+    let p = (0..3).scan(i as i32, |rest, axis| {
+        let at = *rest % dims[axis];
+        *rest /= dims[axis];
+        Some(at)
+    });
+    let p: Vec<i32> = p.collect();
+    let along = [0, 1, 2].map(|axis: usize| {
+        let value = |way: i32, j: i32, k: i32| {
+            let mut q = [p[0], p[1], p[2]];
+            (q[axis], q[(axis + 1) % 3], q[(axis + 2) % 3]) =
+                (q[axis] + way, q[(axis + 1) % 3] + j, q[(axis + 2) % 3] + k);
+            let [x, y, z] = [0, 1, 2].map(|a| q[a].clamp(0, dims[a] - 1));
+            volume.value((x + dims.x * (y + dims.y * z)) as usize)
+        };
+        let distance = (p[axis] + 1).min(dims[axis] - 1) - (p[axis] - 1).max(0);
+        let across = (-1..=1).flat_map(|j: i32| (-1..=1).map(move |k: i32| (j, k)));
+        let weighted =
+            across.map(|(j, k)| f64::from((2 - j.abs()) * (2 - k.abs())) / 16.0 * (value(1, j, k) - value(-1, j, k)));
+        weighted.sum::<f64>() / f64::from(distance.max(1)) / volume.grid().spacing()[axis]
+    });
+    DVec3::from(along)
+}
+
+/// A stored gradient in parts of the greatest.
+fn decoded([x, y, z, root]: [u8; 4]) -> DVec3 {
+    let direction = (DVec3::new(x.into(), y.into(), z.into()) - 127.0) / 127.0;
+    direction * (f64::from(root) / 255.0).powi(2)
 }
 
 fn dims() -> impl Strategy<Value = UVec3> {
@@ -128,6 +162,53 @@ proptest! {
         for level in side.levels() {
             let [a, b] = [&alone, &among_others].map(|source| fetch_values(source, block, level).unwrap());
             prop_assert_eq!(a, b);
+        }
+    }
+
+    #[test]
+    fn spreads_are_those_of_the_voxels_that_samples_average(volume in volumes(), side in side()) {
+        let source = blocks(&volume, side);
+        let (layout, greatest) = (source.layout(), greatest_spread(&source));
+        for (block, level) in all(layout) {
+            let mut codes = Vec::new();
+            source.fetch_companion(Companion::Spread, block, level, &mut codes).unwrap();
+            prop_assert_eq!(codes.len(), layout.n_samples(block, level).element_product() as usize);
+            let samples = points(layout.n_samples(block, level)).zip(fetch_values(&source, block, level).unwrap());
+            for (code, sample) in codes.into_iter().zip(samples) {
+                let values: Vec<f64> = covered(layout, block, level, sample.0).map(|i| volume.value(i)).collect();
+                let (mean, stored) = (values.iter().sum::<f64>() / values.len() as f64, sample.1);
+                let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
+                let ends = values.iter().fold((stored, stored), |(a, b), v| (a.min(*v), b.max(*v)));
+                let room = (stored - ends.0).min(ends.1 - stored);
+                let codes = |spread: f64| if spread > 0.0 { spread / greatest * 255.0 } else { 0.0 };
+                let (wanted, most) = (codes((3.0 * variance).sqrt()), codes(room));
+                let code = f64::from(code);
+                prop_assert!(code <= most + 1e-6 && code <= wanted + 0.5 + 1e-6, "{code} for {wanted}, at most {most}");
+                prop_assert!(code >= (wanted - 0.5).min(most - 1.0) - 1e-6, "{code} for {wanted}, at most {most}");
+                prop_assert!(level > Level(0) || code == 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn gradients_are_averages_of_sobels(volume in volumes(), side in side()) {
+        let source = blocks(&volume, side);
+        let (layout, greatest) = (source.layout(), greatest_gradient(&source));
+        for (block, level) in all(layout) {
+            let mut codes = Vec::new();
+            source.fetch_companion(Companion::Gradient, block, level, &mut codes).unwrap();
+            let n = layout.n_samples(block, level);
+            prop_assert_eq!(codes.len(), 4 * n.element_product() as usize);
+            for (code, sample) in codes.as_chunks().0.iter().zip(points(n)) {
+                let voxels: Vec<usize> = covered(layout, block, level, sample).collect();
+                let sum: DVec3 = voxels.iter().map(|i| sobel(&volume, *i)).sum();
+                let expected = if greatest > 0.0 { sum / voxels.len() as f64 / greatest } else { DVec3::ZERO };
+                let found = decoded(*code);
+                // Half a code of the length's root, and of each component.
+                let half = 0.5 / 255.0;
+                let off = 2.0 * expected.length().sqrt() * half + half * half + 3f64.sqrt() * 0.5 / 127.0 * found.length();
+                prop_assert!((found - expected).length() <= off + 1e-9, "{found} for {expected}");
+            }
         }
     }
 

@@ -18,13 +18,19 @@ pub enum Feature {
     MultiLevel,
     /// Flat blocks at the volume's upper ends have a smaller extent.
     ShortBlocks,
-    /// The transfer function has several knots, and needs a lookup.
+    /// The transfer function has several knots, or light asks for values: they need a lookup.
     TransferLookup,
+    /// Light falls on surfaces.
+    Light,
+    /// The light is elsewhere than the eye.
+    LightBesideEye,
+    /// Normals are of gradients that lie beside the samples.
+    StoredGradients,
 }
 
 impl Feature {
     /// All features.
-    pub const ALL: [Feature; 8] = [
+    pub const ALL: [Feature; 11] = [
         Feature::HardwareFilter,
         Feature::EarlyTermination,
         Feature::SkipEmpty,
@@ -33,6 +39,9 @@ impl Feature {
         Feature::MultiLevel,
         Feature::ShortBlocks,
         Feature::TransferLookup,
+        Feature::Light,
+        Feature::LightBesideEye,
+        Feature::StoredGradients,
     ];
 
     /// The feature's name in shader conditions (`@if(name)`) and reports.
@@ -46,6 +55,9 @@ impl Feature {
             Feature::MultiLevel => "multi_level",
             Feature::ShortBlocks => "short_blocks",
             Feature::TransferLookup => "transfer_lookup",
+            Feature::Light => "light",
+            Feature::LightBesideEye => "light_beside_eye",
+            Feature::StoredGradients => "stored_gradients",
         }
     }
 }

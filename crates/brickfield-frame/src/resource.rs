@@ -2,7 +2,9 @@
 
 use std::borrow::Cow;
 
-use crate::{Chunked, FramePlan, KnotUniform, Slots};
+use brickfield_core::Companion;
+
+use crate::{Chunked, FramePlan, KnotUniform, LightUniform, Slots};
 
 /// A buffer, texture or sampler, by the name that it has in shaders (`frame.wesl`).
 ///
@@ -23,8 +25,18 @@ pub enum Resource {
     Places,
     /// The level of each flat block, and where its samples lie.
     Blocks,
+    /// The spreads of flat blocks' samples, each at its sample's texel, a 3-D texture.
+    Spreads,
+    /// For each flat block that is one sample, its spread.
+    OneSpreads,
+    /// The gradients of flat blocks' samples, each at its sample's texel, a 3-D texture.
+    Gradients,
+    /// For each flat block that is one sample, its gradient.
+    OneGradients,
     /// The transfer function's knots.
     Knots,
+    /// The light on surfaces ([`LightUniform`]).
+    Light,
     /// The picture that rays are stored to.
     Picture,
     /// The inputs of an evaluated function.
@@ -59,14 +71,19 @@ pub enum Content<'a> {
 
 impl Resource {
     /// All resources.
-    pub const ALL: [Resource; 17] = [
+    pub const ALL: [Resource; 22] = [
         Resource::Frame,
         Resource::Atlas,
         Resource::AtlasSampler,
         Resource::Index,
         Resource::Places,
         Resource::Blocks,
+        Resource::Spreads,
+        Resource::OneSpreads,
+        Resource::Gradients,
+        Resource::OneGradients,
         Resource::Knots,
+        Resource::Light,
         Resource::Picture,
         Resource::Inputs,
         Resource::Outputs,
@@ -88,7 +105,12 @@ impl Resource {
             Resource::Index => "index",
             Resource::Places => "places",
             Resource::Blocks => "blocks",
+            Resource::Spreads => "spreads",
+            Resource::OneSpreads => "one_spreads",
+            Resource::Gradients => "gradients",
+            Resource::OneGradients => "one_gradients",
             Resource::Knots => "knots",
+            Resource::Light => "light",
             Resource::Picture => "picture",
             Resource::Inputs => "inputs",
             Resource::Outputs => "outputs",
@@ -118,7 +140,15 @@ impl FramePlan {
             Resource::Index => Some(Content::Chunks(&**self.field.index())),
             Resource::Places => self.field.slots().place_table().map(Content::Chunks),
             Resource::Blocks => self.field.slots().block_table().map(Content::Chunks),
+            Resource::Spreads => self.field.companions(Companion::Spread).map(|slots| Content::Texture(slots)),
+            Resource::OneSpreads => {
+                let slots = self.field.companions(Companion::Spread)?;
+                slots.one_table().map(Content::Chunks)
+            }
+            Resource::Gradients => self.gradients().map(|slots| Content::Texture(slots)),
+            Resource::OneGradients => self.gradients().and_then(|slots| slots.one_table()).map(Content::Chunks),
             Resource::Knots => bytes(bytemuck::cast_slice(&KnotUniform::of(self))),
+            Resource::Light => LightUniform::of(self).and_then(|light| bytes(bytemuck::bytes_of(&light))),
             Resource::Occupancy => self.occupancy.as_ref().map(|occupancy| Content::Chunks(&**occupancy)),
             Resource::Beams => self.beams.as_ref().and_then(|beams| bytes(bytemuck::cast_slice(&beams.spans()))),
             Resource::Drawn => {

@@ -152,7 +152,8 @@ impl Surfaces {
 }
 
 /// The features for which a ray asks the field.
-const READS_FIELD: [Feature; 3] = [Feature::TransferLookup, Feature::SkipEmpty, Feature::SkipMacrocells];
+const READS_FIELD: [Feature; 4] =
+    [Feature::TransferLookup, Feature::SkipEmpty, Feature::SkipMacrocells, Feature::Light];
 
 /// How the knots of a transfer function are searched.
 ///
@@ -270,13 +271,17 @@ impl Variant {
     }
 
     /// The modules that are compiled, one for each path that several modules share.
-    pub(crate) fn chosen_modules(self) -> [&'static str; 2] {
+    pub(crate) fn chosen_modules(self) -> [&'static str; 3] {
         let integrate = match self.segments.division {
             Division::Brick => "integrate/bricks",
             Division::Ray if self.reads_field() => "integrate/rays",
             Division::Ray => "integrate/constant",
         };
-        [self.field.module(), integrate]
+        let gradient = match self.features.contains(Feature::StoredGradients) {
+            true => "gradient/stored",
+            false => "gradient/central",
+        };
+        [self.field.module(), integrate, gradient]
     }
 
     fn reads_field(self) -> bool {
@@ -304,6 +309,8 @@ impl Variant {
             ("wide_blocks", has(Feature::MultiLevel) || has(Feature::SkipEmpty) || self.field != FieldKind::Bricks),
             ("blend", self.field.scheme().is_some()),
             ("interiors_first", self.entry == Entry::Proxy(Slices::InteriorsFirst)),
+            ("dense", self.field == FieldKind::Dense),
+            ("flat_blocks", matches!(self.field, FieldKind::Blocks(_) | FieldKind::Dense)),
             ("long_rays", self.long_rays),
             ("integer_samples", self.integer_samples),
         ];

@@ -191,6 +191,7 @@ fn side_by_side(boxes: &[TexelBox], sample: usize) -> Vec<u8> {
 pub(crate) fn stored_as(device: &Device, format: SampleFormat) -> Result<TextureFormat, RenderError> {
     match format {
         SampleFormat::Unorm8 => Ok(TextureFormat::R8Unorm),
+        SampleFormat::Unorm8x4 => Ok(TextureFormat::Rgba8Unorm),
         SampleFormat::Unorm16 if device.has(Features::TEXTURE_FORMAT_16BIT_NORM) => Ok(TextureFormat::R16Unorm),
         SampleFormat::Unorm16 => {
             Err(RenderError::Unsupported { what: "hold 16-bit samples in textures (TEXTURE_FORMAT_16BIT_NORM)" })

@@ -1,10 +1,11 @@
 //! The flat blocks that frames share, kept from frame to frame.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use brickfield_bricks::{BlockSource, FetchError, SourceId};
+use brickfield_bricks::{BlockSource, FetchError, SourceId, greatest_gradient, greatest_spread};
 use brickfield_core::glam::UVec3;
-use brickfield_core::{BlockLayout, BlockSide, Level};
+use brickfield_core::{BlockLayout, BlockSide, Companion, Level};
 use brickfield_frame::{
     BlockPlaces, BlockRow, BlockSamples, Chunk, Decode, Field, IndexEntry, IndexGrid, IndexLattice, Join, Packing,
     Places, Reach, SampleFormat, Slots,
@@ -31,8 +32,21 @@ struct Held {
     arrangement: Arrangement,
     rows: Vec<BlockRow>,
     chunks: Vec<Option<Arc<Chunk>>>,
+    companions: BTreeMap<Companion, HeldCompanions>,
+    /// Whether blocks have come or moved since the last field.
+    has_changed: bool,
     /// The last field, and the blocks that are drawn in it.
     field: Option<(Vec<bool>, Field)>,
+}
+
+/// The companions of all samples, in the places of the samples.
+#[derive(Debug)]
+struct HeldCompanions {
+    chunks: Vec<Option<Arc<Chunk>>>,
+    /// Of blocks that are one sample.
+    ones: Vec<u32>,
+    /// Whether the last field has others, or none.
+    has_changed: bool,
 }
 
 /// How blocks lie in the texture.
@@ -65,8 +79,13 @@ impl BlockResidency {
         })
     }
 
-    /// Fetches the blocks that have another level than before.
-    pub(crate) fn hold(&mut self, source: &dyn BlockSource, levels: &[Level]) -> Result<(), FetchError> {
+    /// Fetches the blocks that have another level than before, with the companions that are asked for; others are let go.
+    pub(crate) fn hold(
+        &mut self,
+        source: &dyn BlockSource,
+        levels: &[Level],
+        companions: &[Companion],
+    ) -> Result<(), FetchError> {
         self.copied = Copied::default();
         let dense = dense_texels(source.layout(), levels);
         let is_kept = |held: &Held| held.source == source.id() && held.dense_level() == dense.map(|(level, _)| level);
@@ -77,12 +96,20 @@ impl BlockResidency {
         let coding = Coding::of(source);
         let fetched: Vec<Vec<u8>> =
             new.par_iter().map(|i| coding.fetch(source, *i, levels[*i])).collect::<Result<_, _>>()?;
-        self.copied = Copied { n_bricks: new.len(), n_bytes: fetched.iter().map(Vec::len).sum() };
+        let beside = companions.iter().map(|companion| {
+            let is_held = before.is_some_and(|held| held.companions.contains_key(companion));
+            FetchedCompanions::fetch(source, *companion, if is_held { new.clone() } else { all(levels) }, levels)
+        });
+        let beside: Vec<FetchedCompanions> = beside.collect::<Result<_, _>>()?;
+        self.copied = copied(&new, &fetched, &beside);
         let mut held = match self.held.take() {
             Some(held) if is_kept(&held) => held,
             _ => Held::empty(source, levels, dense),
         };
         held.put(source.layout(), coding.format, &new, levels, fetched);
+        held.companions.retain(|companion, _| companions.contains(companion));
+        beside.into_iter().for_each(|fetched| held.put_companions(fetched));
+        held.has_changed |= !new.is_empty();
         if !new.is_empty() && held.is_too_large(source.layout()) {
             held.pack_anew(source.layout());
         }
@@ -92,11 +119,10 @@ impl BlockResidency {
 
     /// The field of the held blocks, of which some are drawn: with the index and the slots of the last one, where they are the same.
     pub(crate) fn field(&mut self, source: &dyn BlockSource, drawn: Vec<bool>, join: Join) -> Field {
-        let is_as_before = self.copied.n_bricks == 0;
         let held = self.held.as_mut().expect("blocks are held before they are a field");
         let before = held.field.take();
         let slots = match &before {
-            Some((_, field)) if is_as_before => Arc::clone(field.slots()),
+            Some((_, field)) if !held.has_changed => Arc::clone(field.slots()),
             Some((_, field)) => Arc::new(held.slots(source).following(field.slots())),
             None => Arc::new(held.slots(source)),
         };
@@ -105,7 +131,14 @@ impl BlockResidency {
             Some((_, field)) => Arc::new(index(source.layout(), &drawn).following(field.index())),
             None => Arc::new(index(source.layout(), &drawn)),
         };
+        let last = before.as_ref().map(|(_, field)| field);
         let field = Field::new(source.layout().dims(), index, slots, join).expect("an index of the blocks' numbers");
+        let field = held.companions.iter().fold(field, |field, (companion, own)| {
+            let slots = own.slots(source, *companion, &field, last);
+            field.with_companions(*companion, slots).expect("companions of the samples")
+        });
+        held.has_changed = false;
+        held.companions.values_mut().for_each(|companions| companions.has_changed = false);
         held.field = Some((drawn, field.clone()));
         field
     }
@@ -128,8 +161,8 @@ impl Held {
             None => Arrangement::Packed(Packing::new(side, n_cubes(side, cubes), MAX_TEXELS)),
         };
         let row = BlockRow { level: side.one_sample(), samples: BlockSamples::One(0.0) };
-        let (rows, chunks) = (vec![row; levels.len()], vec![None; levels.len()]);
-        Held { source: source.id(), arrangement, rows, chunks, field: None }
+        let (rows, chunks, companions) = (vec![row; levels.len()], vec![None; levels.len()], BTreeMap::new());
+        Held { source: source.id(), arrangement, rows, chunks, companions, has_changed: true, field: None }
     }
 
     fn dense_level(&self) -> Option<Level> {
@@ -185,6 +218,19 @@ impl Held {
         }
     }
 
+    /// Puts companions to the places of the samples.
+    fn put_companions(&mut self, FetchedCompanions { companion, blocks, bytes }: FetchedCompanions) {
+        let n_blocks = self.rows.len();
+        let none = || HeldCompanions { chunks: vec![None; n_blocks], ones: vec![0; n_blocks], has_changed: true };
+        let held = self.companions.entry(companion).or_insert_with(none);
+        held.has_changed |= !blocks.is_empty();
+        for (i, bytes) in blocks.into_iter().zip(bytes) {
+            let is_one = matches!(self.rows[i].samples, BlockSamples::One(_));
+            held.ones[i] = if is_one { word(&bytes) } else { 0 };
+            held.chunks[i] = (!is_one).then(|| Arc::new(Chunk::new(bytes)));
+        }
+    }
+
     /// Cubes of a block's side that the blocks fill.
     fn n_cubes(&self, layout: &BlockLayout) -> u64 {
         let in_texture = (0..self.rows.len()).filter(|i| self.chunks[*i].is_some());
@@ -204,8 +250,74 @@ impl Held {
         order.sort_by_key(|i| cube_level(layout, *i, self.rows[*i].level));
         for i in order {
             self.rows[i].samples = BlockSamples::Texture(self.arrangement.take(layout, i, self.rows[i].level));
-            self.chunks[i] = self.chunks[i].as_ref().map(|chunk| Arc::new(Chunk::new(chunk.bytes())));
+            self.chunks[i] = moved(&self.chunks[i]);
+            self.companions.values_mut().for_each(|companions| companions.chunks[i] = moved(&companions.chunks[i]));
         }
+    }
+}
+
+/// The same bytes as another content.
+fn moved(chunk: &Option<Arc<Chunk>>) -> Option<Arc<Chunk>> {
+    chunk.as_ref().map(|chunk| Arc::new(Chunk::new(chunk.bytes())))
+}
+
+/// At most four bytes, the first the lowest.
+fn word(bytes: &[u8]) -> u32 {
+    bytes.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte))
+}
+
+fn all(levels: &[Level]) -> Vec<usize> {
+    (0..levels.len()).collect()
+}
+
+fn copied(new: &[usize], fetched: &[Vec<u8>], beside: &[FetchedCompanions]) -> Copied {
+    let n_bytes = |bytes: &[Vec<u8>]| bytes.iter().map(Vec::len).sum::<usize>();
+    Copied {
+        n_bricks: beside.iter().map(|own| own.blocks.len()).fold(new.len(), usize::max),
+        n_bytes: n_bytes(fetched) + beside.iter().map(|own| n_bytes(&own.bytes)).sum::<usize>(),
+    }
+}
+
+/// The companions of some blocks' samples.
+struct FetchedCompanions {
+    companion: Companion,
+    blocks: Vec<usize>,
+    bytes: Vec<Vec<u8>>,
+}
+
+impl FetchedCompanions {
+    fn fetch(
+        source: &dyn BlockSource,
+        companion: Companion,
+        blocks: Vec<usize>,
+        levels: &[Level],
+    ) -> Result<FetchedCompanions, FetchError> {
+        let fetch = |i: &usize| {
+            let mut bytes = Vec::new();
+            source.fetch_companion(companion, source.layout().block(*i), levels[*i], &mut bytes).map(|()| bytes)
+        };
+        let bytes = blocks.par_iter().map(fetch).collect::<Result<_, _>>()?;
+        Ok(FetchedCompanions { companion, blocks, bytes })
+    }
+}
+
+impl HeldCompanions {
+    /// The companions beside the samples of a field; those of the last field where they are the same.
+    fn slots(&self, source: &dyn BlockSource, companion: Companion, field: &Field, last: Option<&Field>) -> Arc<Slots> {
+        let last = last.and_then(|field| field.companions(companion));
+        if let (Some(last), false) = (last, self.has_changed) {
+            return Arc::clone(last);
+        }
+        let (format, decode) = match companion {
+            Companion::Spread => (SampleFormat::Unorm8, Decode { scale: greatest_spread(source), offset: 0.0 }),
+            Companion::Gradient => (SampleFormat::Unorm8x4, Decode { scale: greatest_gradient(source), offset: 0.0 }),
+        };
+        let slots = field.slots().companions(format, decode, self.chunks.clone(), self.ones.clone());
+        let slots = slots.expect("companions fill the places of samples");
+        Arc::new(match last {
+            Some(last) => slots.following(last),
+            None => slots,
+        })
     }
 }
 
@@ -263,5 +375,100 @@ impl Coding {
         let mut bytes = Vec::new();
         source.fetch(source.layout().block(ordinal), level, &mut bytes)?;
         Ok(encode(bytes, source.scalar_type(), self.format, self.stored))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use brickfield_bricks::{BlockOptions, BlockVolume, NoCompanion, build_blocks};
+    use brickfield_core::glam::DVec3;
+    use brickfield_core::{Grid, Rescale, ScalarType, ValueRange, Volume};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn blocks() -> BlockVolume {
+        let grid = Grid::axis_aligned(UVec3::new(20, 17, 9), DVec3::ONE).unwrap();
+        let voxels: Vec<u16> =
+            (0..grid.n_voxels() as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 16) as u16).collect();
+        let volume = Arc::new(Volume::new(grid, voxels).unwrap());
+        build_blocks(volume, &BlockOptions { side: BlockSide::V8, ..BlockOptions::default() }).unwrap()
+    }
+
+    fn field(residency: &mut BlockResidency, source: &dyn BlockSource, levels: &[Level], asked: &[Companion]) -> Field {
+        residency.hold(source, levels, asked).unwrap();
+        residency.field(source, vec![true; levels.len()], Join::Shared)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn companions_lie_at_their_samples_from_frame_to_frame(
+            frames in prop::collection::vec((prop::collection::vec(0..4u8, 3 * 3 * 2), any::<bool>()), 1..6)
+        ) {
+            let (source, mut residency) = (blocks(), BlockResidency::default());
+            for (levels, is_asked) in frames {
+                let levels: Vec<Level> = levels.into_iter().map(Level).collect();
+                let asked: &[Companion] = if is_asked { &Companion::ALL } else { &[] };
+                let first = field(&mut residency, &source, &levels, asked);
+                let again = field(&mut residency, &source, &levels, asked);
+                prop_assert_eq!(residency.copied(), Copied::default());
+                prop_assert!(Arc::ptr_eq(first.slots(), again.slots()));
+                let Some(spreads) = first.companions(Companion::Spread) else {
+                    prop_assert!(!is_asked);
+                    continue;
+                };
+                prop_assert!(is_asked && Arc::ptr_eq(spreads, again.companions(Companion::Spread).unwrap()));
+                for (i, level) in levels.iter().enumerate() {
+                    let mut expected = Vec::new();
+                    source.fetch_companion(Companion::Spread, source.layout().block(i), *level, &mut expected).unwrap();
+                    let one = || vec![spreads.one_sample(i as u32).unwrap() as u8];
+                    let kept = spreads.samples(i as u32).map_or_else(one, |chunk| chunk.bytes().to_vec());
+                    prop_assert_eq!(kept, expected);
+                }
+            }
+        }
+    }
+
+    /// Values alone, as of a store.
+    struct Plain(BlockVolume);
+
+    impl BlockSource for Plain {
+        fn id(&self) -> SourceId {
+            self.0.id()
+        }
+        fn layout(&self) -> &BlockLayout {
+            self.0.layout()
+        }
+        fn grid(&self) -> &Grid {
+            self.0.grid()
+        }
+        fn scalar_type(&self) -> ScalarType {
+            self.0.scalar_type()
+        }
+        fn rescale(&self) -> Rescale {
+            self.0.rescale()
+        }
+        fn range(&self) -> ValueRange {
+            self.0.range()
+        }
+        fn summaries(&self) -> &[brickfield_core::BlockSummary] {
+            self.0.summaries()
+        }
+        fn fetch(&self, block: UVec3, level: Level, out: &mut Vec<u8>) -> Result<(), FetchError> {
+            self.0.fetch(block, level, out)
+        }
+    }
+
+    #[test]
+    fn a_source_of_values_alone_says_so_and_the_residency_stays_as_it_was() {
+        let (source, mut residency) = (Plain(blocks()), BlockResidency::default());
+        let levels = vec![Level(1); source.layout().n_blocks_total()];
+        let before = field(&mut residency, &source, &levels, &[]);
+        let error = residency.hold(&source, &levels, &[Companion::Spread]).unwrap_err();
+        let cause = error.cause.downcast_ref::<NoCompanion>().unwrap();
+        assert!(cause.to_string().starts_with("the source has values alone, and no spreads"), "{cause}");
+        assert_eq!(field(&mut residency, &source, &levels, &[]), before);
     }
 }

@@ -2,8 +2,9 @@
 
 use brickfield_bricks::{BlockSource, FetchError};
 use brickfield_core::glam::UVec3;
-use brickfield_core::{Aabb, BlockLayout, BlockSide, Level, Projection, TransferFunction, ValueRange};
-use brickfield_frame::{Drawing, FramePlan, IndexEntry, Join, PlanError, PlanParts, Slices};
+use brickfield_core::{Aabb, BlockLayout, BlockSide, Companion, Level, Projection, TransferFunction, ValueRange};
+use brickfield_frame::{Drawing, FramePlan, IndexEntry, Join, Lighting, PlanError, PlanParts, Slices};
+use brickfield_optics::Normals;
 use rayon::prelude::*;
 
 use crate::course::{Course, segment_reach, to_sample_space};
@@ -70,7 +71,7 @@ pub fn prepare_blocks(
     check_levels(source.layout(), levels)?;
     let coarsest = levels.iter().copied().max().unwrap_or(Level(0));
     let Course { domain, sampling, rays } = Course::new(source.grid(), scene, coarsest)?;
-    residency.hold(source, levels)?;
+    residency.hold(source, levels, companions(scene))?;
     let style = match scene.quality {
         Quality::Final => style,
         Quality::Draft => BlockStyle { join: Join::Shared, ..style },
@@ -84,7 +85,16 @@ pub fn prepare_blocks(
     };
     let field = residency.field(source, drawn, style.join);
     let parts = PlanParts::new(field, rays, domain, sampling, scene.transfer.clone());
-    Ok(FramePlan::new(PlanParts { drawing, ..parts })?)
+    let lighting = scene.light.map(|light| Lighting::new(light, source.grid()));
+    Ok(FramePlan::new(PlanParts { lighting, drawing, ..parts })?)
+}
+
+/// The companions of samples that a frame needs.
+fn companions(scene: &Scene) -> &'static [Companion] {
+    match scene.light.map(|light| light.normals()) {
+        Some(Normals::Stored) => &[Companion::Gradient],
+        _ => &[],
+    }
 }
 
 fn check_levels(layout: &BlockLayout, levels: &[Level]) -> Result<(), PrepareBlocksError> {
@@ -179,9 +189,11 @@ fn back_to_front(source: &dyn BlockSource, scene: &Scene, drawn: &[bool]) -> Vec
 mod tests {
     use std::sync::Arc;
 
-    use brickfield_bricks::{BlockOptions, BlockVolume, build_blocks};
+    use brickfield_bricks::{BlockOptions, BlockVolume, BuildOptions, build_blocks, build_tree};
     use brickfield_core::glam::{DVec3, UVec2};
     use brickfield_core::{Camera, Grid, Interblock, Knot, Volume};
+    use brickfield_frame::Feature;
+    use brickfield_optics::{Light, LightSource, LightTerms};
     use proptest::prelude::*;
 
     use super::*;
@@ -215,6 +227,26 @@ mod tests {
             Some(chunk) => chunk.bytes().to_vec(),
             None => (slots.one_sample(i as u32).unwrap() as u16).to_le_bytes().to_vec(),
         }
+    }
+
+    #[test]
+    fn stored_normals_bring_gradients_which_bricks_do_not_have() {
+        let source = blocks(UVec3::new(20, 17, 9));
+        let levels: Vec<Level> = (0..source.layout().n_blocks_total()).map(|i| Level(i as u8 % 4)).collect();
+        let light = Light::new(LightSource::Head, LightTerms::default(), 900.0).unwrap();
+        let on = |normals| Scene { light: Some(light.on_normals(normals)), ..scene(&source) };
+        let mut residency = BlockResidency::default();
+        let mut plan = |normals| prepare_blocks(&source, &on(normals), &levels, BLENDED, &mut residency).unwrap();
+        let n_samples = |plan: &FramePlan| plan.field().slots().n_bytes() / 2;
+        let stored = plan(Normals::Stored);
+        let gradients = stored.gradients().unwrap();
+        assert_eq!(gradients.n_bytes(), 4 * n_samples(&stored));
+        assert!(stored.features().contains(Feature::StoredGradients));
+        let central = plan(Normals::Central);
+        assert!(central.gradients().is_none() && central.field().companions(Companion::Gradient).is_none());
+        let tree = build_tree(source.volume(), &BuildOptions::default()).unwrap();
+        let refused = crate::prepare(&tree, &on(Normals::Stored), &mut crate::Residency::default());
+        assert_eq!(refused.err(), Some(PrepareError::Plan(PlanError::NoGradients)));
     }
 
     #[test]

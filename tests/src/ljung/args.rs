@@ -56,6 +56,8 @@ pub enum Part {
     Weights,
     /// Jumps on faces, edges and corners of blocks
     Continuity,
+    /// A ball in the light, whose normals are known
+    Light,
     /// Figure 9: the bytes of blocks at given levels
     Accounting,
     /// Error against the full resolution, time and bytes, at several budgets
@@ -79,6 +81,7 @@ impl Part {
             Part::Gradient => "Figure 7: a rotated linear gradient",
             Part::Weights => "Figures 4 and 5: weights",
             Part::Continuity => "Continuity, and equal resolutions",
+            Part::Light => "A ball in the light",
             Part::Accounting => "Figure 9: bytes",
             Part::Table => "Error, time and bytes",
             Part::Cost => "Cost of interpolation between blocks",

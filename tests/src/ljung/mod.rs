@@ -3,6 +3,7 @@
 //!
 //! - `gradient`: figure 7, a rotated linear gradient at random resolutions. `weights`: figures 4 and 5, read back from backends.
 //! - `continuity`: jumps on faces, edges and corners; equal resolutions against trilinear interpolation.
+//! - `light`: a ball whose normals are known, in the light.
 //! - `accounting`: figure 9. `table`: error, time, samples and bytes at several budgets. `cost`: schemes against the nearest block.
 //! - `rank`: estimated errors of blocks against exact ones. `reselect`: after an edit of the transfer function. `store`: a volume on disk,
 //!   larger than its budget. `figures`: pictures.
@@ -15,6 +16,7 @@ mod data;
 mod error;
 mod figures;
 mod gradient;
+mod light;
 mod rank;
 mod reselect;
 mod schemes;
@@ -37,6 +39,7 @@ pub fn ljung(args: &LjungArgs) -> Result<Findings, PaperError> {
         Part::Gradient => gradient::run(args, rivals),
         Part::Weights => weights::run(args, rivals),
         Part::Continuity => continuity::run(args, rivals),
+        Part::Light => light::run(args, rivals),
         Part::Accounting => accounting::run(),
         Part::Table => table::run(args, rivals),
         Part::Cost => cost::run(args, rivals),

@@ -1,6 +1,6 @@
 //! The ways in which values between blocks come about.
 
-use brickfield::frame::{Join, Slices};
+use brickfield::frame::Join;
 use brickfield::{BlockStyle, TransparentBlocks};
 use brickfield_core::Interblock;
 
@@ -18,5 +18,5 @@ pub(super) const fn name(join: Join) -> &'static str {
 
 /// Transparent blocks are empty, as in the paper.
 pub(super) fn style(join: Join) -> BlockStyle {
-    BlockStyle { join, transparent: TransparentBlocks::Empty, slices: Slices::Together }
+    BlockStyle { join, transparent: TransparentBlocks::Empty, ..BlockStyle::default() }
 }

@@ -20,7 +20,7 @@ pub struct Contestant<'a> {
 /// What a contestant draws, and what of it is resident.
 enum Subject<'a> {
     Tree(&'a BrickTree, Box<Residency>),
-    Blocks(&'a dyn BlockSource, Vec<Level>, BlockStyle, BlockResidency),
+    Blocks(&'a dyn BlockSource, Vec<Level>, BlockStyle, Box<BlockResidency>),
 }
 
 /// A frame and its times in milliseconds.
@@ -56,7 +56,7 @@ impl<'a> Contestant<'a> {
 
     /// A scene of flat blocks at some levels, of which no backend has any yet.
     pub fn of_blocks(source: &'a dyn BlockSource, levels: Vec<Level>, style: BlockStyle, scene: Scene) -> Self {
-        Contestant { subject: Subject::Blocks(source, levels, style, BlockResidency::default()), scene }
+        Contestant { subject: Subject::Blocks(source, levels, style, Box::default()), scene }
     }
 
     /// Renders a frame. The bricks are resident if the backend's frame before was this contestant's, too; if not, the time

@@ -32,6 +32,7 @@ fn filled(format: SampleFormat, value: impl Fn(u32, UVec3) -> u32) -> Slots {
         SampleFormat::Unorm8 => (Decode { scale: 255.0 / 16.0, offset: 0.0 }, 16),
         SampleFormat::Unorm16 => (Decode { scale: 65535.0 / 4096.0, offset: 0.0 }, 4096),
         SampleFormat::Float32 => (Decode { scale: 1.0, offset: 0.0 }, 1),
+        SampleFormat::Unorm8x4 => unreachable!("values are single numbers"),
     };
     let mut bytes = Vec::new();
     for i in 0..3 * N.pow(3) {
@@ -61,6 +62,7 @@ pub(crate) fn plan(slots: Slots, transfer: TransferFunction, rule: QuadratureRul
         domain: domain(),
         sampling,
         transfer,
+        lighting: None,
         dark: DarkRegions::default(),
         drawing: Drawing::Rays,
     };
@@ -81,6 +83,7 @@ fn parts(plan: &FramePlan) -> PlanParts {
         domain: *plan.domain(),
         sampling: *plan.sampling(),
         transfer: plan.transfer().clone(),
+        lighting: None,
         dark: DarkRegions::default(),
         drawing: Drawing::Rays,
     }

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::shrink::{BlockScalar, BlockVoxels, Totals};
 use super::source::SourceId;
+use super::spread::greatest_of;
 use super::summary::{Summing, constant_summary};
 use super::volume::{BlockVolume, n_averages, n_before};
 use crate::SliceError;
@@ -59,7 +60,8 @@ pub fn build_blocks(volume: Arc<Volume>, options: &BlockOptions) -> Result<Block
         let summaries = fill(v, &layout, volume.rescale(), &mut averages);
         (averages.into(), summaries)
     });
-    Ok(BlockVolume { id: SourceId::unique(), layout, volume, averages, summaries: summaries.into() })
+    let (id, greatest_spread) = (SourceId::unique(), greatest_of(&summaries));
+    Ok(BlockVolume { id, layout, volume, averages, summaries: summaries.into(), greatest_spread })
 }
 
 /// The number of averages, if they are few enough.

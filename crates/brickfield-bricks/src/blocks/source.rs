@@ -4,7 +4,9 @@ use std::error::Error;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use brickfield_core::glam::UVec3;
-use brickfield_core::{BlockLayout, BlockSummary, Grid, Level, Rescale, ScalarType, ValueRange};
+use brickfield_core::{BlockLayout, BlockSummary, Companion, Grid, Level, Rescale, ScalarType, ValueRange};
+
+use super::{gradient, spread};
 
 /// The flat blocks of a volume, wherever their samples are kept.
 ///
@@ -37,6 +39,21 @@ pub trait BlockSource: Sync {
     /// # Errors
     /// If the layout has no such block or level, or the samples cannot be had.
     fn fetch(&self, block: UVec3, level: Level, out: &mut Vec<u8>) -> Result<(), FetchError>;
+
+    /// Replaces `out` with the companions of a block's samples, in the order of [`fetch`](Self::fetch): [`Companion::n_bytes`] each.
+    ///
+    /// # Errors
+    /// As `fetch`; a source that has no such companions, which is what this method says of every source that does not define it.
+    fn fetch_companion(
+        &self,
+        companion: Companion,
+        block: UVec3,
+        level: Level,
+        _out: &mut Vec<u8>,
+    ) -> Result<(), FetchError> {
+        FetchError::unless_exists(self.layout(), block, level)?;
+        Err(FetchError::new(block, level, NoCompanion { companion }))
+    }
 }
 
 /// The identity of a source of blocks: equal samples elsewhere are another source.
@@ -60,6 +77,14 @@ pub struct FetchError {
     pub level: Level,
     #[source]
     pub cause: Box<dyn Error + Send + Sync>,
+}
+
+/// A source whose samples have no such companions: the cause of a [`FetchError`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the source has values alone, and no {companion}: take the blocks of a volume in memory")]
+#[allow(missing_docs)]
+pub struct NoCompanion {
+    pub companion: Companion,
 }
 
 /// A block or level that a layout does not have: the cause of a [`FetchError`].
@@ -88,6 +113,18 @@ impl FetchError {
             false => Err(FetchError::new(block, level, NoSuchBlock { n_blocks, coarsest })),
         }
     }
+}
+
+/// The spread that a [`Companion::Spread`] of 255 stands for, in data values: half of the widest range of a block.
+///
+/// No spread is greater. 0 if all blocks are constant.
+pub fn greatest_spread(source: &dyn BlockSource) -> f64 {
+    spread::greatest_of(source.summaries())
+}
+
+/// The length that a [`Companion::Gradient`] of 255 stands for, in data values per world unit: the range of values in every spacing.
+pub fn greatest_gradient(source: &dyn BlockSource) -> f64 {
+    gradient::greatest_of(source.range(), source.grid())
 }
 
 /// The data values of a block's samples, x fastest.

@@ -72,7 +72,7 @@ pub(crate) fn constant_summary(value: f64) -> BlockSummary {
 
 /// Data values as parts of a block's range: its least is 0, its greatest 1.
 #[derive(Clone, Copy)]
-struct Parts {
+pub(super) struct Parts {
     rescale: Rescale,
     /// A half where the range is wider than the greatest f64, else 1.
     scale: f64,
@@ -81,20 +81,30 @@ struct Parts {
 }
 
 impl Parts {
-    fn new(range: ValueRange, rescale: Rescale) -> Parts {
+    pub(super) fn new(range: ValueRange, rescale: Rescale) -> Parts {
         let scale = if (range.max - range.min).is_finite() { 1.0 } else { 0.5 };
         let min = range.min * scale;
         Parts { rescale, scale, min, width: range.max * scale - min }
     }
 
     #[inline]
-    fn of(&self, stored: f64) -> f64 {
-        (self.rescale.value(stored) * self.scale - self.min) / self.width
+    pub(super) fn of(&self, stored: f64) -> f64 {
+        self.of_value(self.rescale.value(stored))
+    }
+
+    #[inline]
+    pub(super) fn of_value(&self, value: f64) -> f64 {
+        (value * self.scale - self.min) / self.width
     }
 
     /// In units of the data, squared; at most the greatest f64.
     fn variance(&self, of_parts: f64) -> f64 {
-        (of_parts.sqrt() * self.width / self.scale).powi(2).min(f64::MAX)
+        self.width_of(of_parts.sqrt()).powi(2).min(f64::MAX)
+    }
+
+    /// A difference of parts, in units of the data.
+    pub(super) fn width_of(&self, parts: f64) -> f64 {
+        parts * self.width / self.scale
     }
 }
 

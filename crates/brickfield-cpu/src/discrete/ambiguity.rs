@@ -8,7 +8,8 @@
 //! roundings of the numbers that decoding adds up.
 //!
 //! **Bound.** A segment that may have depth d' and emission e' instead of d and e changes a channel by at most
-//! T (|e' - e| + |e^-d' - e^-d|), T being the transmittance before it: the light from behind has colours of at most 1. Segments
+//! T (|e' - e| + |e^-d' - e^-d|), T being the transmittance before it: the light from behind has colours of at most 1 (in the light of a
+//! lamp: of its `brightness`). Segments
 //! change one after the other; T is taken with the least depths that the segments before may have. The sum is a bound.
 
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
@@ -16,11 +17,12 @@ use brickfield_core::{Aabb, Level, Span};
 use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, PlanRay};
 use brickfield_optics::{Segment, alpha, transmittance};
 
-use super::change::{Values, difference, spread};
-use super::field::FieldReader;
+use super::change::{Nodes, difference, spread};
+use super::field::{FieldReader, Patch};
+use super::light::{Node, brightness, shade_jump};
 use super::straying::straying;
 use super::walk::{CutSegment, clip, middle, parts, segments, whole};
-use super::{part_values, relative, segment};
+use super::{part_nodes, relative, segment};
 use crate::blocks::Blocks;
 
 /// How far the cosines of a ray's angles to planes may be off: a few roundings of numbers below 1.
@@ -37,6 +39,10 @@ pub(super) struct Ambiguity {
     max_extinction: f64,
     /// The coarsest level of resident blocks.
     coarsest: Level,
+    /// The greatest channel of a colour.
+    brightness: f64,
+    /// Gradients jump where the values do that they are made of.
+    shades_stray: bool,
 }
 
 impl Ambiguity {
@@ -49,6 +55,8 @@ impl Ambiguity {
             jumps: (0..knots.len() - 1).filter(jump).map(|i| knots[i].value).collect(),
             max_extinction: knots.iter().map(|k| k.extinction).fold(0.0, f64::max),
             coarsest: coarsest(field.plan()),
+            brightness: brightness(field.plan()),
+            shades_stray: field.plan().lighting().is_some() && field.jumps_between_levels(),
         }
     }
 
@@ -71,7 +79,8 @@ impl Ambiguity {
     /// The opacity that a ray near the domain's surface may have at most.
     fn grazing(&self, ray: &PlanRay, domain: &Aabb, delta: DVec3) -> f64 {
         let span = clip(ray, &grown(domain, delta), ray.t_eye);
-        span.map_or(0.0, |span| alpha(self.max_extinction * (span.end - span.start)))
+        let most = |span: Span| self.brightness * alpha(self.max_extinction * (span.end - span.start));
+        span.map_or(0.0, most)
     }
 
     fn inside(&self, field: &impl FieldReader, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
@@ -81,7 +90,7 @@ impl Ambiguity {
             Lengths::Nominal => self.appearing(field, ray, span, delta),
         };
         let nodes_stray = self.several_kinds && sampling.division() == Division::Ray;
-        let changing = match nodes_stray || !self.jumps.is_empty() {
+        let changing = match nodes_stray || !self.jumps.is_empty() || self.shades_stray {
             true => self.changing(field, ray, span, delta),
             false => 0.0,
         };
@@ -99,12 +108,17 @@ impl Ambiguity {
         let rule = plan.sampling().rule();
         for part in parts(plan, ray, span) {
             let at = |x: f64| plan.rays().center + ray.at(part.at(x));
-            if !rule.nodes().iter().any(|x| self.may_be_close(field, part, at(*x), delta)) {
-                least_depth += segment(plan, part_values(field, ray, part), part.length).depth;
-                continue;
-            }
-            let nodes: Vec<Values> = rule.nodes().iter().map(|x| self.values(field, part, at(*x), delta)).collect();
-            let (change, least) = spread(plan, &nodes, part);
+            let jumps = |x: &f64| self.shade_jump(field, ray, (part, at(*x)), delta);
+            let shade_error = rule.nodes().iter().map(jumps).fold(0.0, f64::max);
+            let nodes: Vec<Nodes> = match rule.nodes().iter().any(|x| self.may_be_close(field, part, at(*x), delta)) {
+                true => rule.nodes().iter().map(|x| self.nodes(field, ray, (part, at(*x)), delta)).collect(),
+                false if shade_error == 0.0 => {
+                    least_depth += segment(plan, part_nodes(field, ray, part), part.length).depth;
+                    continue;
+                }
+                false => part_nodes(field, ray, part).map(|node| vec![node]).to_vec(),
+            };
+            let (change, least) = spread(plan, &nodes, part, || shade_error);
             bound += transmittance(least_depth) * change;
             least_depth += least;
         }
@@ -122,8 +136,8 @@ impl Ambiguity {
             let doubtful = segments(beside, step).filter(|s| is_at_surface(ray.at(middle(s)), &b, delta));
             let segment = |s| {
                 let part = whole(s, nominal, cell);
-                let seen = segment(plan, part_values(field, ray, part), part.length);
-                difference(&seen, &Segment::default())
+                let seen = segment(plan, part_nodes(field, ray, part), part.length);
+                difference(plan, &seen, &Segment::default())
             };
             doubtful.map(segment).sum::<f64>()
         };
@@ -142,38 +156,48 @@ impl Ambiguity {
         !self.jumps.is_empty() || at_face()
     }
 
-    /// The values that a node of `part` at `q` may have.
-    fn values(&self, field: &impl FieldReader, part: CutSegment, q: DVec3, delta: DVec3) -> Values {
-        let q = field.clamped(q);
-        let own = part.cell.unwrap_or_else(|| field.cell_at(q));
-        let mut values = vec![field.value(&field.patch_of(own), q)];
-        self.beyond_jumps(field, own, q, delta, &mut values);
-        if !self.several_kinds || part.cell.is_some() {
-            return values;
+    /// How much a node's shade may change where its gradient jumps.
+    fn shade_jump(&self, field: &impl FieldReader, ray: &PlanRay, (part, p): (CutSegment, DVec3), delta: DVec3) -> f64 {
+        if !self.shades_stray {
+            return 0.0;
         }
-        let kind = |c: UVec3| Kind::of(field, c);
-        let (low, high) = (field.cell_at(q - delta), field.cell_at(q + delta));
-        for cell in cells(low, high).filter(|c| kind(*c) != kind(own)) {
-            values.push(field.value(&field.patch_of(cell), q));
-            self.beyond_jumps(field, cell, q, delta, &mut values);
-        }
-        values
+        let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(p)));
+        if patch.is_empty() { 0.0 } else { shade_jump(field, &patch, p, ray, delta) }
     }
 
-    /// Adds both sides of the jumps that the value in `cell` is close to.
-    fn beyond_jumps(&self, field: &impl FieldReader, cell: UVec3, q: DVec3, delta: DVec3, values: &mut Values) {
-        if self.jumps.is_empty() {
-            return;
+    /// What a node of `part` at `p` may be.
+    fn nodes(&self, field: &impl FieldReader, ray: &PlanRay, (part, p): (CutSegment, DVec3), delta: DVec3) -> Nodes {
+        let q = field.clamped(p);
+        let own = part.cell.unwrap_or_else(|| field.cell_at(q));
+        let mut nodes = Vec::new();
+        let mut add = |cell| {
+            let patch = field.patch_of(cell);
+            let node = Node::at(field, &patch, p, ray);
+            nodes.push(node);
+            let jumps = node.map(|node| self.near_jumps(field, &patch, q, (delta, node.value))).unwrap_or_default();
+            nodes.extend(node.iter().flat_map(|node| jumps.iter().map(|value| Some(Node { value: *value, ..*node }))));
+        };
+        add(own);
+        if self.several_kinds && part.cell.is_none() {
+            let kind = |c: UVec3| Kind::of(field, c);
+            let (low, high) = (field.cell_at(q - delta), field.cell_at(q + delta));
+            cells(low, high).filter(|c| kind(*c) != kind(own)).for_each(add);
         }
-        let patch = field.patch_of(cell);
-        let (Some(around), Some(value)) = (field.around(&patch, q), field.value(&patch, q)) else { return };
+        nodes
+    }
+
+    /// Both sides of the jumps that a value at `q` is close to.
+    fn near_jumps(&self, field: &impl FieldReader, patch: &Patch, q: DVec3, (delta, value): (DVec3, f64)) -> Vec<f64> {
+        if self.jumps.is_empty() {
+            return Vec::new();
+        }
+        let Some(around) = field.around(patch, q) else { return Vec::new() };
         let (gain, (min, max)) = (field.gain(), around.range);
         let offset = field.plan().field().slots().decode().offset;
         let magnitude = gain * min.abs().max(max.abs()) + offset.abs() + self.jumps[0].abs();
-        let reach = gain * field.moved(&patch, q, delta) + ROUNDING * magnitude;
-        for jump in self.jumps.iter().filter(|j| (value - **j).abs() <= reach) {
-            values.extend([Some(jump.next_down()), Some(*jump)]);
-        }
+        let reach = gain * field.moved(patch, q, delta) + ROUNDING * magnitude;
+        let near = self.jumps.iter().filter(|j| (value - **j).abs() <= reach);
+        near.flat_map(|jump| [jump.next_down(), *jump]).collect()
     }
 }
 
@@ -218,7 +242,8 @@ fn has_several_kinds(field: &impl FieldReader) -> bool {
     kinds.any(|k| Some(k) != first)
 }
 
-fn cells(low: UVec3, high: UVec3) -> impl Iterator<Item = UVec3> {
+/// The index cells of a box, both corners included.
+pub(super) fn cells(low: UVec3, high: UVec3) -> impl Iterator<Item = UVec3> {
     let rows = move |z| (low.y..=high.y).map(move |y| (y, z));
     (low.z..=high.z).flat_map(rows).flat_map(move |(y, z)| (low.x..=high.x).map(move |x| UVec3::new(x, y, z)))
 }

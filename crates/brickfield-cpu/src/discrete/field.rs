@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Interblock, Place};
 use brickfield_frame::{BlockPlaces, FramePlan, IndexEntry, Join, Places, SampleFormat};
-use brickfield_interp::interpolate;
+use brickfield_interp::{Neighbourhood, interpolate};
 
 /// How a sample is read from a slot's bytes.
 trait Stored: Sync {
@@ -51,6 +51,7 @@ pub(super) fn with_field<W: Work>(plan: &FramePlan, work: W) -> W::Output {
         SampleFormat::Unorm8 => with_join::<Unorm8, W>(plan, work),
         SampleFormat::Unorm16 => with_join::<Unorm16, W>(plan, work),
         SampleFormat::Float32 => with_join::<Float32, W>(plan, work),
+        SampleFormat::Unorm8x4 => unreachable!("values are single numbers"),
     }
 }
 
@@ -71,9 +72,22 @@ pub(super) trait FieldReader: Sync {
     #[inline]
     fn patch_of(&self, cell: UVec3) -> Patch {
         let field = self.plan().field();
-        let IndexEntry::Resident { slot, .. } = field.index().at(cell) else { return Patch { slot: None } };
-        Patch { slot: field.place_at(cell).map(|place| (slot, place)) }
+        let IndexEntry::Resident { slot, .. } = field.index().at(cell) else { return Patch { cell, slot: None } };
+        Patch { cell, slot: field.place_at(cell).map(|place| (slot, place)) }
     }
+
+    /// The patch around an index cell, as gradients ask for it: flat blocks have values even where the index has them as empty.
+    fn lit_patch_of(&self, cell: UVec3) -> Patch {
+        match self.plan().field().slots().places() {
+            Places::Blocks(places) => {
+                Patch { cell, slot: Some((places.layout().ordinal(cell) as u32, places.place(cell))) }
+            }
+            _ => self.patch_of(cell),
+        }
+    }
+
+    /// How many samples of level 0 two neighbouring samples of a patch are apart, at a clamped position of it.
+    fn spacing(&self, patch: &Patch, q: DVec3) -> f64;
 
     /// The stored number that a patch has at a clamped position; `None` if it is empty.
     fn stored(&self, patch: &Patch, q: DVec3) -> Option<f64>;
@@ -83,6 +97,10 @@ pub(super) trait FieldReader: Sync {
 
     /// How far the stored number may move if the position is off by `delta`; 0 if the patch is empty.
     fn moved(&self, patch: &Patch, q: DVec3, delta: DVec3) -> f64;
+
+    /// The stored gradient at a clamped position of a patch that is not empty: its four numbers, 0 to 1, and for each the widest range of
+    /// those that are interpolated in one block.
+    fn codes(&self, patch: &Patch, q: DVec3) -> [Code; 4];
 
     /// Whether the field jumps where two resident blocks of different levels meet.
     fn jumps_between_levels(&self) -> bool;
@@ -106,13 +124,6 @@ pub(super) trait FieldReader: Sync {
         Some(slots.decode().value(self.stored(patch, q)? / slots.format().unit()))
     }
 
-    /// The data value at a sample position; `None` where its patch is empty.
-    #[inline]
-    fn value_at(&self, q: DVec3) -> Option<f64> {
-        let q = self.clamped(q);
-        self.value(&self.patch_of(self.cell_at(q)), q)
-    }
-
     /// Data values between two stored numbers, without sign.
     fn gain(&self) -> f64 {
         let slots = self.plan().field().slots();
@@ -123,8 +134,17 @@ pub(super) trait FieldReader: Sync {
 /// A part of a field with one way to fetch its values.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Patch {
+    /// An index cell of its block.
+    pub(super) cell: UVec3,
     /// Its slot and where that one's samples lie; `None` if nothing is visible there.
     slot: Option<(u32, Place)>,
+}
+
+impl Patch {
+    /// Whether nothing is visible there.
+    pub(super) fn is_empty(&self) -> bool {
+        self.slot.is_none()
+    }
 }
 
 /// The samples between which a number lies.
@@ -133,6 +153,13 @@ pub(super) struct Around {
     /// Least and greatest of them.
     pub(super) range: (f64, f64),
     /// The widest range of those that are interpolated in one block.
+    pub(super) widest: f64,
+}
+
+/// One of the numbers of a stored gradient.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Code {
+    pub(super) value: f64,
     pub(super) widest: f64,
 }
 
@@ -162,20 +189,38 @@ impl<S: Stored> Shared<'_, S> {
     #[inline]
     fn cell(&self, slot: u32, place: &Place, q: DVec3) -> Option<Cell> {
         let slots = self.plan.field().slots();
-        let Some(samples) = slots.samples(slot) else {
-            return Some(Cell { samples: [slots.one_sample(slot)?; 8], fraction: DVec3::ZERO });
-        };
-        let last = place.n_in_space() - 1;
-        let s = place.local(q).clamp(DVec3::ZERO, last.as_dvec3());
-        let i = s.as_uvec3().min(last.saturating_sub(UVec3::ONE));
-        let strides = strides(place);
-        let base: usize = (0..3).map(|axis| i[axis] as usize * strides[axis]).sum();
-        // Along an axis with a single sample there is no neighbour.
-        let next = [0, 1, 2].map(|axis| if last[axis] > 0 { strides[axis] } else { 0 });
-        let corner = |c: usize| (c & 1) * next[0] + (c >> 1 & 1) * next[1] + (c >> 2) * next[2];
-        let samples = std::array::from_fn(|c| S::read(samples.bytes(), base + corner(c)));
-        Some(Cell { samples, fraction: s - i.as_dvec3() })
+        match slots.samples(slot) {
+            Some(samples) => Some(cell_of(place, q, |i| S::read(samples.bytes(), i))),
+            None => Some(Cell { samples: [slots.one_sample(slot)?; 8], fraction: DVec3::ZERO }),
+        }
     }
+
+    /// The numbers `channel` of a slot's stored gradients around a clamped position.
+    fn cell_of_codes(&self, slot: u32, place: &Place, q: DVec3, channel: usize) -> Cell {
+        let slots = self.plan.gradients().expect("a plan with stored normals has gradients");
+        match slots.samples(slot) {
+            Some(samples) => cell_of(place, q, |i| f64::from(samples.bytes()[4 * i + channel]) / 255.0),
+            None => {
+                let word = slots.one_sample(slot).expect("a flat block has a gradient") as u32;
+                let code = f64::from(word.to_le_bytes()[channel]) / 255.0;
+                Cell { samples: [code; 8], fraction: DVec3::ZERO }
+            }
+        }
+    }
+}
+
+/// The samples around a clamped position, read by number.
+#[inline]
+fn cell_of(place: &Place, q: DVec3, read: impl Fn(usize) -> f64) -> Cell {
+    let last = place.n_in_space() - 1;
+    let s = place.local(q).clamp(DVec3::ZERO, last.as_dvec3());
+    let i = s.as_uvec3().min(last.saturating_sub(UVec3::ONE));
+    let strides = strides(place);
+    let base: usize = (0..3).map(|axis| i[axis] as usize * strides[axis]).sum();
+    // Along an axis with a single sample there is no neighbour.
+    let next = [0, 1, 2].map(|axis| if last[axis] > 0 { strides[axis] } else { 0 });
+    let corner = |c: usize| (c & 1) * next[0] + (c >> 1 & 1) * next[1] + (c >> 2) * next[2];
+    Cell { samples: std::array::from_fn(|c| read(base + corner(c))), fraction: s - i.as_dvec3() }
 }
 
 impl<S: Stored> FieldReader for Shared<'_, S> {
@@ -196,6 +241,11 @@ impl<S: Stored> FieldReader for Shared<'_, S> {
         Some(Around { range, widest: range.1 - range.0 })
     }
 
+    fn codes(&self, patch: &Patch, q: DVec3) -> [Code; 4] {
+        let (slot, place) = patch.slot.expect("a patch that is not empty");
+        std::array::from_fn(|channel| Code::of(&self.cell_of_codes(slot, &place, q, channel)))
+    }
+
     /// By the slope between samples.
     fn moved(&self, patch: &Patch, q: DVec3, delta: DVec3) -> f64 {
         let (Some((_, place)), Some(around)) = (patch.slot, self.around(patch, q)) else { return 0.0 };
@@ -206,6 +256,10 @@ impl<S: Stored> FieldReader for Shared<'_, S> {
 
     fn jumps_between_levels(&self) -> bool {
         true
+    }
+
+    fn spacing(&self, patch: &Patch, _: DVec3) -> f64 {
+        patch.slot.map_or(1.0, |(_, place)| f64::from(place.level.stride()))
     }
 }
 
@@ -251,6 +305,21 @@ impl<S: Stored> FieldReader for Blended<'_, S> {
         Some(around)
     }
 
+    fn codes(&self, _: &Patch, q: DVec3) -> [Code; 4] {
+        let level = |block| self.places.row(block).level;
+        std::array::from_fn(|channel| {
+            let mut widest = 0.0f64;
+            let fetch = |block| {
+                let slot = self.places.layout().ordinal(block) as u32;
+                let code = Code::of(&self.shared.cell_of_codes(slot, &self.places.place(block), q, channel));
+                widest = widest.max(code.widest);
+                code.value
+            };
+            let value = interpolate(self.places.layout(), self.scheme, q.to_array(), level, fetch);
+            Code { value, widest }
+        })
+    }
+
     /// By looking: weights and samples change.
     fn moved(&self, patch: &Patch, q: DVec3, delta: DVec3) -> f64 {
         let Some(here) = self.stored(patch, q) else { return 0.0 };
@@ -263,6 +332,22 @@ impl<S: Stored> FieldReader for Blended<'_, S> {
 
     fn jumps_between_levels(&self) -> bool {
         false
+    }
+
+    /// The mean over the eight blocks, by their weights: as continuous as the field.
+    fn spacing(&self, _: &Patch, q: DVec3) -> f64 {
+        let around = Neighbourhood::around(self.places.layout(), q.to_array());
+        let level = |block| self.places.row(block).level;
+        let weights = around.weights(self.places.layout(), self.scheme, level).into_iter().enumerate();
+        let stride = |b| around.block(b).map_or(0.0, |block| f64::from(level(block).stride()));
+        weights.map(|(b, weight)| weight * stride(b)).sum()
+    }
+}
+
+impl Code {
+    fn of(cell: &Cell) -> Code {
+        let (min, max) = cell.range();
+        Code { value: trilinear(cell), widest: max - min }
     }
 }
 

@@ -6,6 +6,7 @@
 mod ambiguity;
 mod change;
 mod field;
+mod light;
 mod rounding;
 mod straying;
 mod walk;
@@ -13,11 +14,12 @@ mod walk;
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Aabb, Image};
 use brickfield_frame::{FramePlan, PlanRay};
-use brickfield_optics::{QuadratureRule, RayState, Segment};
+use brickfield_optics::{QuadratureRule, RayState, Segment, Shade};
 use rayon::prelude::*;
 
 use ambiguity::Ambiguity;
 use field::{FieldReader, Work, with_field};
+use light::Node;
 pub use rounding::{filter_rounding, position_rounding};
 use walk::{CutSegment, clip, parts};
 
@@ -27,7 +29,8 @@ pub struct Discrete {
     /// Linear, premultiplied RGBA.
     pub image: Image<f64>,
     /// For each pixel, rows from the top: the most by which any of its channels changes when nodes within f32 rounding of
-    /// a face between blocks of different level, or of a jump of the transfer function, fall on the other side; when a ray
+    /// a face between blocks of different level, or of a jump of the transfer function, fall on the other side; when one of the values does
+    /// that a node's gradient is made of; when a ray
     /// along a face of a block runs on its other side; when it takes the other of two stacks of planes, or one more or less middle of
     /// nominal length; 0 for pixels without any of these.
     ///
@@ -106,11 +109,11 @@ fn along(field: &impl FieldReader, ray: &PlanRay) -> Pixel {
     let Some(span) = clip(ray, &relative(plan.domain(), plan.rays().center), ray.t_eye) else { return pixel };
     let mut state = RayState::default();
     for part in parts(plan, ray, span) {
-        let values = part_values(field, ray, part);
+        let nodes = part_nodes(field, ray, part);
         pixel.n_samples += plan.sampling().rule().nodes().len() as u64;
-        let segment = segment(plan, values, part.length);
+        let segment = segment(plan, nodes, part.length);
         if segment.depth > 0.0 {
-            pixel.n_visible_samples += n_visible(field, &values);
+            pixel.n_visible_samples += n_visible(field, &nodes);
             pixel.n_visible_segments += 1;
             state.push(segment);
         }
@@ -123,46 +126,54 @@ fn greatest_difference(a: &[f64; 4], b: &[f64; 4]) -> f64 {
     a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
 }
 
-/// The values at the nodes of a segment.
-fn part_values(field: &impl FieldReader, ray: &PlanRay, part: CutSegment) -> [Option<f64>; 2] {
-    node_values(field.plan().sampling().rule(), |x| {
-        let q = field.plan().rays().center + ray.at(part.at(x));
-        match part.cell {
-            Some(cell) => field.value(&field.patch_of(cell), field.clamped(q)),
-            None => field.value_at(q),
-        }
+/// The nodes of a segment, `None` in empty blocks (and for the second node of a rule that has one). A segment without depth is as
+/// without light.
+fn part_nodes(field: &impl FieldReader, ray: &PlanRay, part: CutSegment) -> [Option<Node>; 2] {
+    let (plan, rule) = (field.plan(), field.plan().sampling().rule());
+    let position = |x: f64| plan.rays().center + ray.at(part.at(x));
+    let nodes = at_nodes(rule, |x| {
+        let q = field.clamped(position(x));
+        let cell = part.cell.unwrap_or_else(|| field.cell_at(q));
+        field.value(&field.patch_of(cell), q).map(Node::unlit)
+    });
+    if plan.lighting().is_none() || segment(plan, nodes, part.length).depth == 0.0 {
+        return nodes;
+    }
+    at_nodes(rule, |x| {
+        let p = position(x);
+        let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(p)));
+        Node::at(field, &patch, p, ray)
     })
 }
 
-/// The values at a rule's nodes, `None` in empty blocks (and for the second node of a rule that has one).
-fn node_values(rule: QuadratureRule, at: impl Fn(f64) -> Option<f64>) -> [Option<f64>; 2] {
+fn at_nodes(rule: QuadratureRule, at: impl Fn(f64) -> Option<Node>) -> [Option<Node>; 2] {
     let nodes = rule.nodes();
     [at(nodes[0]), nodes.get(1).and_then(|x| at(*x))]
 }
 
-/// A segment whose nodes have the given values; `None`: extinction 0.
-fn segment(plan: &FramePlan, values: [Option<f64>; 2], length_world: f64) -> Segment {
-    let rule = plan.sampling().rule();
-    match (values, rule) {
+/// A segment of some nodes; `None`: extinction 0.
+fn segment(plan: &FramePlan, nodes: [Option<Node>; 2], length_world: f64) -> Segment {
+    let (transfer, rule) = (plan.transfer(), plan.sampling().rule());
+    match (nodes.map(|node| node.map(Node::lit)), rule) {
         ([None, None], _) => Segment::default(),
-        ([Some(a), Some(b)], _) => rule.segment(plan.transfer(), &[a, b], length_world),
-        ([Some(v), None] | [None, Some(v)], QuadratureRule::Gauss2) => one_gauss_node(plan, v, length_world),
+        ([Some(a), Some(b)], _) => rule.lit_segment(transfer, &[a, b], length_world),
+        ([Some(node), None] | [None, Some(node)], QuadratureRule::Gauss2) => one_gauss_node(plan, node, length_world),
         (_, QuadratureRule::PreIntegrated) => Segment::default(),
-        ([Some(v), None] | [None, Some(v)], _) => rule.segment(plan.transfer(), &[v], length_world),
+        ([Some(node), None] | [None, Some(node)], _) => rule.lit_segment(transfer, &[node], length_world),
     }
 }
 
 /// A two-point Gauss segment whose other node has extinction 0: half the depth, all of the node's colour.
-fn one_gauss_node(plan: &FramePlan, value: f64, length_world: f64) -> Segment {
-    QuadratureRule::MidpointExponential.segment(plan.transfer(), &[value], 0.5 * length_world)
+fn one_gauss_node(plan: &FramePlan, node: (f64, Shade), length_world: f64) -> Segment {
+    QuadratureRule::MidpointExponential.lit_segment(plan.transfer(), &[node], 0.5 * length_world)
 }
 
 /// How many nodes of a visible segment have an extinction above 0.
-fn n_visible(field: &impl FieldReader, values: &[Option<f64>; 2]) -> u64 {
+fn n_visible(field: &impl FieldReader, nodes: &[Option<Node>; 2]) -> u64 {
     if field.plan().sampling().rule().nodes().len() == 1 {
         return 1;
     }
-    values.iter().flatten().filter(|v| field.plan().transfer().at(**v).extinction > 0.0).count() as u64
+    nodes.iter().flatten().filter(|n| field.plan().transfer().at(n.value).extinction > 0.0).count() as u64
 }
 
 fn relative(b: &Aabb, center: DVec3) -> Aabb {

@@ -12,6 +12,9 @@
 //! **Codes.** Texture units may filter 8-bit texels in 8-bit arithmetic (llvmpipe does): each of the three steps of
 //! interpolation then rounds to the nearest code: at most [`CODES`] codes in all, for any R.
 //!
+//! **Light.** A node's shade is as far off as its gradient is: each of the six values that this is made of may move as the node's own
+//! does, and has a rounding of its own besides.
+//!
 //! **Pixel.** A node whose value may lie anywhere in v +- dv may have any extinction and colour that the transfer function has
 //! there: this is where its slope enters, exactly and on both sides of knots and jumps. A segment changes the pixel by at most
 //! T (|e' - e| + |e^-d' - e^-d|), T being the greatest transmittance that the segments before it may leave. The sum along the ray
@@ -19,19 +22,24 @@
 
 use brickfield_core::TransferFunction;
 use brickfield_core::glam::{DVec3, UVec2};
-use brickfield_frame::{FramePlan, SampleFormat};
+use brickfield_frame::{FramePlan, PlanRay, SampleFormat};
 use brickfield_optics::transmittance;
 use rayon::prelude::*;
 
-use super::change::{Values, spread};
-use super::field::{Around, FieldReader, Patch, Work, with_field};
-use super::relative;
+use super::change::{Nodes, spread};
+use super::field::{Around, Code, FieldReader, Patch, Work, with_field};
+use super::light::{Beside, Node, ValueError, shade_error};
 use super::walk::{CutSegment, clip, parts};
+use super::{part_nodes, relative};
 
 /// Roundings that `RayFrame::rounding` reckons with at worst; here one of them.
 const AT_WORST: f64 = 8.0;
 /// Rounding of an 8-bit filter: three steps, half a code each.
 const CODES: f64 = 1.5;
+/// Roundings of a value between samples: of numbers of the value scale, which are below 4.
+const OF_VALUE: f64 = 4.0 / (1u32 << 24) as f64;
+/// Roundings of a number of a stored gradient, which is at most 1.
+const OF_CODE: f64 = 8.0 / (1u32 << 24) as f64;
 /// Extinction and colour are extreme at the candidates; of wide ranges their product may pass its ends by second order.
 const SECOND_ORDER: f64 = 1.05;
 
@@ -81,11 +89,20 @@ fn of_pixel(field: &impl FieldReader, at: UVec2, cause: Cause) -> f64 {
         Cause::Positions => field.gain() * field.moved(patch, q, delta),
         Cause::Filter { sub_texel_bits } => filtered(field, field.gain() * around.widest, sub_texel_bits),
     };
+    let code = |code: &Code| match cause {
+        Cause::Positions => 0.0,
+        Cause::Filter { sub_texel_bits } => filtered_code(code, sub_texel_bits),
+    };
     let (mut bound, mut least_depth) = (0.0, 0.0);
     for part in parts(plan, ray, span) {
-        let values = |x: &f64| values(field, part, plan.rays().center + ray.at(part.at(*x)), stray);
-        let nodes: Vec<Values> = plan.sampling().rule().nodes().iter().map(values).collect();
-        let (change, least) = spread(plan, &nodes, part);
+        let position = |x: &f64| plan.rays().center + ray.at(part.at(*x));
+        let own = part_nodes(field, ray, part);
+        let rule = plan.sampling().rule();
+        let of = |(x, own): (&f64, Option<Node>)| nodes(field, (part, own), position(x), stray);
+        let nodes: Vec<Nodes> = rule.nodes().iter().zip(own).map(of).collect();
+        let shade = |x: &f64| shade_off(field, ray, (part, position(x)), delta, stray, code);
+        let shade_error = || rule.nodes().iter().map(shade).fold(0.0, f64::max);
+        let (change, least) = spread(plan, &nodes, part, shade_error);
         bound += transmittance(least_depth) * change;
         least_depth += least;
     }
@@ -101,27 +118,57 @@ fn filtered(field: &impl FieldReader, range: f64, bits: u32) -> f64 {
     (weights + code).min(range + code)
 }
 
-/// The values that a node at `q` may have; none where its block is empty. `stray` says how far the value may move, in data values.
-fn values(
-    field: &impl FieldReader,
-    part: CutSegment,
-    q: DVec3,
-    stray: impl Fn(&Patch, DVec3, &Around) -> f64,
-) -> Values {
-    let q = field.clamped(q);
-    let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(q)));
-    let (Some(value), Some(around)) = (field.value(&patch, q), field.around(&patch, q)) else {
-        return vec![None];
-    };
-    candidates(field.plan().transfer(), value, stray(&patch, q, &around))
+/// How far filtering may move a number of a stored gradient: as it does a value of 8 bits.
+fn filtered_code(code: &Code, bits: u32) -> f64 {
+    let by_code = if bits < f32::MANTISSA_DIGITS - 1 { CODES / 255.0 } else { 0.0 };
+    (3.0 * (-f64::from(bits)).exp2() * code.widest).min(code.widest) + by_code
 }
 
-/// The values at which extinction and colour are extreme: the node's own first, the ends, and both sides of knots between.
-fn candidates(transfer: &TransferFunction, value: f64, stray: f64) -> Values {
-    if stray == 0.0 {
-        return vec![Some(value)];
+/// What a node at `p` may be; none where its block is empty. `stray` says how far the value may move, in data values.
+fn nodes(
+    field: &impl FieldReader,
+    (part, own): (CutSegment, Option<Node>),
+    p: DVec3,
+    stray: impl Fn(&Patch, DVec3, &Around) -> f64,
+) -> Nodes {
+    let q = field.clamped(p);
+    let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(q)));
+    let (Some(node), Some(around)) = (own, field.around(&patch, q)) else {
+        return vec![None];
+    };
+    candidates(field.plan().transfer(), node, stray(&patch, q, &around))
+}
+
+/// How far the shade of a node at `p` may be off, of the factor and the highlight together; 0 without light.
+fn shade_off(
+    field: &impl FieldReader,
+    ray: &PlanRay,
+    (part, p): (CutSegment, DVec3),
+    delta: DVec3,
+    stray: impl Fn(&Patch, DVec3, &Around) -> f64,
+    filtered_code: impl Fn(&Code) -> f64,
+) -> f64 {
+    let Some(lighting) = field.plan().lighting() else { return 0.0 };
+    let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(p)));
+    if patch.is_empty() {
+        return 0.0;
     }
-    let (low, high) = (value - stray, value + stray);
+    let rounding = OF_VALUE * field.plan().value_scale().unit();
+    let error =
+        |b: &Beside| rounding + field.around(&b.patch, b.at).map_or(0.0, |around| stray(&b.patch, b.at, &around));
+    let of_code = |code: &Code| OF_CODE + filtered_code(code);
+    let error = ValueError { of_value: error, of_code };
+    let off = shade_error(field, lighting, (&patch, p, ray), delta, error);
+    off.factor + off.highlight
+}
+
+/// The nodes at which extinction and colour are extreme: the node itself first, the ends of its value, and both sides of knots between.
+fn candidates(transfer: &TransferFunction, node: Node, stray: f64) -> Nodes {
+    if stray == 0.0 {
+        return vec![Some(node)];
+    }
+    let (low, high) = (node.value - stray, node.value + stray);
     let knots = transfer.knots().iter().map(|k| k.value).filter(|v| low <= *v && *v <= high);
-    [value, low, high].into_iter().chain(knots.flat_map(|v| [v.next_down(), v])).map(Some).collect()
+    let values = [node.value, low, high].into_iter().chain(knots.flat_map(|v| [v.next_down(), v]));
+    values.map(|value| Some(Node { value, ..node })).collect()
 }

@@ -13,7 +13,7 @@ use brickfield_optics::{Segment, transmittance};
 use super::change::difference;
 use super::field::FieldReader;
 use super::walk::{CutSegment, parts_in_block, segments};
-use super::{part_values, segment};
+use super::{part_nodes, segment};
 use crate::blocks::{Blocks, Crossing};
 
 /// An optical depth that is less than the tolerance of exact mode.
@@ -103,7 +103,7 @@ fn change_along(
         let (mut most, mut least) = (0.0f64, here.sum.depth);
         by_cut = by_cut.max(here.by_cut);
         for there in ways.iter().map(|way| light(field, ray, way, piece)) {
-            most = most.max(difference(&here.sum, &there.sum));
+            most = most.max(difference(field.plan(), &here.sum, &there.sum));
             least = least.min(there.sum.depth);
             by_cut = by_cut.max(there.by_cut);
         }
@@ -117,13 +117,13 @@ fn change_along(
 /// The light of a piece of a ray that crosses blocks.
 fn light(field: &impl FieldReader, ray: &PlanRay, crossings: &[Crossing], piece: Span) -> Light {
     let mut light = Light::default();
-    let of = |part: CutSegment| segment(field.plan(), part_values(field, ray, part), part.length);
+    let of = |part: CutSegment| segment(field.plan(), part_nodes(field, ray, part), part.length);
     for crossing in crossings {
         let span = Span { start: piece.start.max(crossing.span.start), end: piece.end.min(crossing.span.end) };
         for part in parts_in_block(field.plan(), ray, span, crossing.cell) {
             let (whole, mut halves) = (of(part), Segment::default());
             part.halves().into_iter().for_each(|half| push(&mut halves, &of(half)));
-            light.by_cut = light.by_cut.max(difference(&whole, &halves));
+            light.by_cut = light.by_cut.max(difference(field.plan(), &whole, &halves));
             push(&mut light.sum, &whole);
         }
     }

@@ -5,16 +5,17 @@ mod brick;
 mod classify;
 mod detail;
 mod f32_plan;
+mod light;
 mod march;
 mod placed;
 mod scalar;
-
 mod segment;
+mod single;
 
 use std::ops::Range;
 use std::time::Instant;
 
-use brickfield_core::glam::{DVec3, UVec2};
+use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickSide, Image};
 use brickfield_frame::{
     Backend, Capabilities, Description, Evaluate, Frame, FramePlan, Join, Places, PlanRay, RenderError, SampleFormat,
@@ -107,8 +108,18 @@ trait Renderer: Sync {
 
     fn transfer(&self) -> &Classifier;
 
-    /// The value at a sample position, as a number of the value scale; `None` where its block is empty.
-    fn value(&self, q: DVec3) -> Option<f32>;
+    /// The value that the block around an index cell has at a sample position, as a number of the value scale; `None` if it is empty.
+    fn value_in(&self, cell: UVec3, q: DVec3) -> Option<f32>;
+
+    /// The same, as gradients ask for it: of some fields, empty blocks have values, too.
+    fn value_beside(&self, cell: UVec3, q: DVec3) -> Option<f32> {
+        self.value_in(cell, q)
+    }
+
+    /// The stored gradient of the block around an index cell at a sample position: its four numbers, 0 to 1. 0 where a plan has none.
+    fn codes(&self, _cell: UVec3, _q: DVec3) -> [f32; 4] {
+        [0.0; 4]
+    }
 
     /// The pixel of a ray, of which some runs of segments may see something, front to back.
     fn pixel(&self, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4];
@@ -123,13 +134,16 @@ impl<const N: usize, S: Stored> Renderer for F32Plan<'_, N, S> {
         &self.transfer
     }
 
-    fn value(&self, q: DVec3) -> Option<f32> {
-        F32Plan::value(self, q)
+    fn value_in(&self, cell: UVec3, q: DVec3) -> Option<f32> {
+        F32Plan::value_in(self, &self.block_of(cell), q)
     }
 
     #[inline(always)]
     fn pixel(&self, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
-        march::march(self, ray, runs)
+        match self.plan.lighting() {
+            None => march::march(self, ray, runs),
+            Some(_) => single::pixel(self, ray, runs),
+        }
     }
 }
 
@@ -144,6 +158,7 @@ fn dispatch<W: Work>(plan: &FramePlan, work: W) -> W::Output {
         SampleFormat::Unorm8 => dispatch_side::<Unorm8, W>(plan, work),
         SampleFormat::Unorm16 => dispatch_side::<Unorm16, W>(plan, work),
         SampleFormat::Float32 => dispatch_side::<Float32, W>(plan, work),
+        SampleFormat::Unorm8x4 => unreachable!("values are single numbers"),
     }
 }
 
@@ -234,7 +249,8 @@ fn evaluate(renderer: &impl Renderer, function: ShaderFunction, [x, y, z, _]: [f
             [s.emission[0], s.emission[1], s.emission[2], s.depth]
         }
         ShaderFunction::Sample => {
-            let value = renderer.value(DVec3::new(x.into(), y.into(), z.into()));
+            let q = DVec3::new(x.into(), y.into(), z.into());
+            let value = renderer.value_in(plan.field().cell_at(q), q);
             value.map_or([0.0; 4], |v| [values.value(v.into()) as f32, 1.0, 0.0, 0.0])
         }
         ShaderFunction::RayAnchor => {

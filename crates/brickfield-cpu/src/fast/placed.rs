@@ -1,20 +1,17 @@
-//! A plan whose slots are of several sizes, or flat blocks: each segment by itself.
+//! A plan whose slots are of several sizes, or flat blocks.
 
 use std::marker::PhantomData;
 use std::ops::Range;
 
+use brickfield_core::Place;
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Level, Place};
-use brickfield_frame::{Division, FramePlan, Join, Places, PlanRay};
+use brickfield_frame::{FramePlan, Join, Places, PlanRay};
 use brickfield_interp::interpolate;
 
-use super::Renderer;
 use super::brick::Stored;
 use super::classify::Classifier;
 use super::f32_plan::Numbers;
-use super::march::{Path, clip, one};
-use super::segment::Ray32;
-use crate::blocks::Blocks;
+use super::{Renderer, single};
 
 /// A plan whose places differ, and whose samples are stored as `S`.
 pub(super) struct PlacedPlan<'a, S> {
@@ -30,10 +27,9 @@ impl<'a, S: Stored> PlacedPlan<'a, S> {
         PlacedPlan { plan, transfer, numbers: Numbers::of(plan), stored: PhantomData }
     }
 
-    /// The value that the block around an index cell has at a sample position; `None` if it is empty.
-    fn value_in(&self, cell: UVec3, q: DVec3) -> Option<f32> {
+    /// The value that the block around an index cell, in a slot, has at a sample position.
+    fn value_of(&self, slot: u32, cell: UVec3, q: DVec3) -> Option<f32> {
         let field = self.plan.field();
-        let slot = field.index().at(cell).slot()?;
         let q = q.clamp(DVec3::ZERO, field.last_sample());
         let stored = match (field.join(), field.slots().places()) {
             (Join::Blend(scheme), Places::Blocks(places)) => {
@@ -41,6 +37,7 @@ impl<'a, S: Stored> PlacedPlan<'a, S> {
                 let fetch = |block| f64::from(self.stored(layout.ordinal(block) as u32, &places.place(block), q));
                 interpolate(layout, scheme, q.to_array(), |block| places.row(block).level, fetch) as f32
             }
+            (_, Places::Blocks(places)) => self.stored(slot, &places.place(cell), q),
             _ => self.stored(slot, &field.place_at(cell)?, q),
         };
         Some(stored * self.numbers.gain + self.numbers.offset)
@@ -66,41 +63,50 @@ impl<S: Stored> Renderer for PlacedPlan<'_, S> {
         &self.transfer
     }
 
-    fn value(&self, q: DVec3) -> Option<f32> {
-        self.value_in(self.plan.field().cell_at(q), q)
+    fn value_in(&self, cell: UVec3, q: DVec3) -> Option<f32> {
+        let slot = self.plan.field().index().at(cell).slot()?;
+        self.value_of(slot, cell, q)
+    }
+
+    /// Flat blocks have values even where the index has them as empty.
+    fn value_beside(&self, cell: UVec3, q: DVec3) -> Option<f32> {
+        match self.plan.field().slots().places() {
+            Places::Blocks(places) => self.value_of(places.layout().ordinal(cell) as u32, cell, q),
+            _ => self.value_in(cell, q),
+        }
+    }
+
+    fn codes(&self, cell: UVec3, q: DVec3) -> [f32; 4] {
+        let field = self.plan.field();
+        let q = q.clamp(DVec3::ZERO, field.last_sample());
+        let (Some(gradients), Places::Blocks(places)) = (self.plan.gradients(), field.slots().places()) else {
+            return [0.0; 4];
+        };
+        let layout = places.layout();
+        let of_block = |block: UVec3, channel: usize| {
+            let slot = layout.ordinal(block) as u32;
+            match gradients.samples(slot) {
+                Some(codes) => {
+                    trilinear(&places.place(block), q, |i| f32::from(codes.bytes()[4 * i + channel])) / 255.0
+                }
+                None => {
+                    let word = gradients.one_sample(slot).unwrap_or_default() as u32;
+                    f32::from(word.to_le_bytes()[channel]) / 255.0
+                }
+            }
+        };
+        std::array::from_fn(|channel| match field.join() {
+            Join::Blend(scheme) => {
+                let level = |block| places.row(block).level;
+                let fetch = |block| f64::from(of_block(block, channel));
+                interpolate(layout, scheme, q.to_array(), level, fetch) as f32
+            }
+            _ => of_block(cell, channel),
+        })
     }
 
     fn pixel(&self, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
-        let (plan, center) = (self.plan, self.plan.rays().center);
-        let domain = (plan.domain().min - center, plan.domain().max - center);
-        let Some(span) = clip(ray, domain, ray.t_eye) else { return [0.0; 4] };
-        let (mut state, optics) = (Ray32::default(), (plan, &self.transfer));
-        let floor = plan.sampling().transmittance_floor();
-        let has_ended = |state: &Ray32| state.transmittance < floor || state.transmittance == 0.0;
-        match plan.sampling().division() {
-            Division::Ray => {
-                let path = Path::new(plan.sampling(), ray, span, Level(0));
-                for k in runs.iter().flat_map(|run| path.first.max(run.start)..path.end.min(run.end)) {
-                    state.push(one(optics, &path, k, |q| self.value(q)));
-                    if has_ended(&state) {
-                        break;
-                    }
-                }
-            }
-            Division::Brick => {
-                for crossing in Blocks::new(plan, ray, span).filter(|c| c.entry.slot().is_some()) {
-                    let level = plan.field().level_at(crossing.cell);
-                    let path = Path::new(plan.sampling(), ray, crossing.span, level);
-                    for k in path.first..path.end {
-                        state.push(one(optics, &path, k, |q| self.value_in(crossing.cell, q)));
-                    }
-                    if has_ended(&state) {
-                        break;
-                    }
-                }
-            }
-        }
-        state.rgba()
+        single::pixel(self, ray, runs)
     }
 }
 

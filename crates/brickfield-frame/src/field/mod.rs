@@ -15,7 +15,7 @@ mod slots;
 use std::sync::Arc;
 
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Aabb, BlockLayout, Interblock, Level, Place};
+use brickfield_core::{Aabb, BlockLayout, Companion, Interblock, Level, Place};
 
 pub use atlas::{AtlasShape, Room, RoomChange, TextureShape};
 pub use blocks::{BlockPlaces, BlockRow, BlockSamples};
@@ -30,7 +30,11 @@ pub struct Field {
     index: Arc<IndexGrid>,
     slots: Arc<Slots>,
     join: Join,
+    companions: Companions,
 }
+
+/// The companions of a field's samples, by [`Companion`]; `None` where a frame needs none.
+pub(crate) type Companions = [Option<Arc<Slots>>; Companion::ALL.len()];
 
 /// How a value between two slots comes about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -71,6 +75,8 @@ pub enum FieldError {
     SlotOfBlock { cell: UVec3, slot: u32, expected: u32 },
     #[error("slots that are blended: only flat blocks are")]
     BlendOfBricks,
+    #[error("{companion} of other samples: they lie at the places of the field's")]
+    OtherCompanions { companion: Companion },
 }
 
 impl Field {
@@ -101,12 +107,30 @@ impl Field {
             _ if join != Join::Shared => return Err(FieldError::BlendOfBricks),
             _ => {}
         }
-        Ok(Field { dims, index, slots, join })
+        Ok(Field { dims, index, slots, join, companions: Companions::default() })
+    }
+
+    /// The field with companions of its samples.
+    ///
+    /// # Errors
+    /// Companions of other samples.
+    pub fn with_companions(mut self, companion: Companion, slots: Arc<Slots>) -> Result<Field, FieldError> {
+        if !slots.are_companions_of(&self.slots) {
+            return Err(FieldError::OtherCompanions { companion });
+        }
+        self.companions[companion as usize] = Some(slots);
+        Ok(self)
     }
 
     /// A field of parts that may not fit.
-    pub(crate) fn unchecked(dims: UVec3, index: Arc<IndexGrid>, slots: Arc<Slots>, join: Join) -> Field {
-        Field { dims, index, slots, join }
+    pub(crate) fn unchecked(
+        dims: UVec3,
+        index: Arc<IndexGrid>,
+        slots: Arc<Slots>,
+        join: Join,
+        companions: Companions,
+    ) -> Field {
+        Field { dims, index, slots, join, companions }
     }
 
     /// Samples of the volume along x, y, z, at level 0.
@@ -125,6 +149,12 @@ impl Field {
     #[inline]
     pub fn slots(&self) -> &Arc<Slots> {
         &self.slots
+    }
+
+    /// The companions of the samples; `None` where the frame needs none.
+    #[inline]
+    pub fn companions(&self, companion: Companion) -> Option<&Arc<Slots>> {
+        self.companions[companion as usize].as_ref()
     }
 
     /// How a value between two slots comes about.

@@ -17,6 +17,9 @@ pub enum SampleFormat {
     Unorm16,
     /// 32-bit float, read as it is.
     Float32,
+    /// Four numbers of 8 bits, read as stored / 255 each: companions only ([`Slots::companions`]). Where one number is asked for, it is
+    /// the first.
+    Unorm8x4,
 }
 
 impl SampleFormat {
@@ -52,7 +55,7 @@ impl SampleFormat {
         match self {
             SampleFormat::Unorm8 => 1,
             SampleFormat::Unorm16 => 2,
-            SampleFormat::Float32 => 4,
+            SampleFormat::Float32 | SampleFormat::Unorm8x4 => 4,
         }
     }
 
@@ -60,7 +63,7 @@ impl SampleFormat {
     #[inline]
     pub const fn unit(self) -> f64 {
         match self {
-            SampleFormat::Unorm8 => 255.0,
+            SampleFormat::Unorm8 | SampleFormat::Unorm8x4 => 255.0,
             SampleFormat::Unorm16 => 65535.0,
             SampleFormat::Float32 => 1.0,
         }
@@ -70,7 +73,9 @@ impl SampleFormat {
     #[inline]
     pub fn stored(self, read: f32) -> f64 {
         match self {
-            SampleFormat::Unorm8 | SampleFormat::Unorm16 => (f64::from(read) * self.unit()).round(),
+            SampleFormat::Unorm8 | SampleFormat::Unorm8x4 | SampleFormat::Unorm16 => {
+                (f64::from(read) * self.unit()).round()
+            }
             SampleFormat::Float32 => f64::from(read),
         }
     }
@@ -80,6 +85,7 @@ impl SampleFormat {
     pub fn read(self, bytes: &[u8], i: usize) -> f64 {
         match self {
             SampleFormat::Unorm8 => f64::from(bytes[i]) / 255.0,
+            SampleFormat::Unorm8x4 => f64::from(bytes[4 * i]) / 255.0,
             SampleFormat::Unorm16 => f64::from(u16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]])) / 65535.0,
             SampleFormat::Float32 => {
                 let b = &bytes[4 * i..4 * i + 4];
@@ -131,6 +137,8 @@ pub struct Slots {
     places: Places,
     samples: Vec<Option<Arc<Chunk>>>,
     table: Option<PlaceTable>,
+    /// Of companions: the texel of each block that is one sample.
+    ones: Option<Vec<u32>>,
     id: ContentId,
 }
 
@@ -148,7 +156,7 @@ const PAGE_BYTES: usize = 4096;
 /// Slots are equal if their samples are.
 impl PartialEq for Slots {
     fn eq(&self, other: &Slots) -> bool {
-        let of = |s: &Slots| (s.format, s.decode, s.samples.clone(), s.places.clone());
+        let of = |s: &Slots| (s.format, s.decode, s.samples.clone(), s.places.clone(), s.ones.clone());
         self.id == other.id || of(self) == of(other)
     }
 }
@@ -172,19 +180,26 @@ pub enum SlotsError {
     OneSample { slot: usize, level: Level, is_in_row: bool, n_samples: usize },
     #[error("a texture of {texels} texels for flat blocks; a row tells {most} apart")]
     Rows { texels: UVec3, most: UVec3 },
+    #[error("values of four numbers each: only companions of values have as many")]
+    FourNumbers,
+    #[error("companions of bricks: only samples of flat blocks have companions")]
+    CompanionsOfBricks,
 }
 
 impl Slots {
     /// Slots of given samples, at given places.
     ///
     /// # Errors
-    /// Samples that do not fill their place; a place that is missing, empty, or outside of its texture.
+    /// Samples of four numbers; samples that do not fill their place; a place that is missing, empty, or outside of its texture.
     pub fn new(
         format: SampleFormat,
         decode: Decode,
         places: Places,
         samples: Vec<Option<Arc<Chunk>>>,
     ) -> Result<Slots, SlotsError> {
+        if format == SampleFormat::Unorm8x4 {
+            return Err(SlotsError::FourNumbers);
+        }
         match &places {
             Places::Even(side) => {
                 let expected = side.n_samples_total() * format.n_bytes();
@@ -212,7 +227,33 @@ impl Slots {
             }
             Places::Blocks(places) => Some(PlaceTable::new(bytemuck::cast_slice(&places.packed()))),
         };
-        Ok(Slots { format, decode, places, samples, table, id: ContentId::new() })
+        Ok(Slots { format, decode, places, samples, table, ones: None, id: ContentId::new() })
+    }
+
+    /// The companions of these samples of flat blocks: each at its sample's texel, in a texture of their own.
+    ///
+    /// `ones` has a word for each block: of a block that is one sample its companion's bytes from the lowest bits on, of others 0.
+    ///
+    /// # Errors
+    /// Slots that are no flat blocks; companions that do not fill the places of the samples.
+    pub fn companions(
+        &self,
+        format: SampleFormat,
+        decode: Decode,
+        samples: Vec<Option<Arc<Chunk>>>,
+        ones: Vec<u32>,
+    ) -> Result<Slots, SlotsError> {
+        let Places::Blocks(places) = &self.places else { return Err(SlotsError::CompanionsOfBricks) };
+        check_number(places.rows().len(), samples.len())?;
+        check_number(places.rows().len(), ones.len())?;
+        check_bytes(&samples, |slot| places.n_texels(slot) * format.n_bytes())?;
+        let (places, table) = (self.places.clone(), Some(PlaceTable::new(bytemuck::cast_slice(&ones))));
+        Ok(Slots { format, decode, places, samples, table, ones: Some(ones), id: ContentId::new() })
+    }
+
+    /// Whether these are companions of other slots' samples.
+    pub fn are_companions_of(&self, values: &Slots) -> bool {
+        self.ones.is_some() && values.ones.is_none() && self.places == values.places
     }
 
     /// Bricks of one size, whose bytes follow one another.
@@ -257,6 +298,7 @@ impl Slots {
     /// The table of places as shaders read it ([`PlaceUniform`]); `None` where there is none.
     pub fn place_table(&self) -> Option<&dyn Chunked> {
         match self.places {
+            _ if self.ones.is_some() => None,
             Places::Even(_) | Places::Blocks(_) => None,
             Places::Table { .. } => self.table.as_ref().map(|table| table as &dyn Chunked),
         }
@@ -265,9 +307,15 @@ impl Slots {
     /// The rows of flat blocks as shaders read them; `None` of other slots.
     pub fn block_table(&self) -> Option<&dyn Chunked> {
         match self.places {
+            _ if self.ones.is_some() => None,
             Places::Even(_) | Places::Table { .. } => None,
             Places::Blocks(_) => self.table.as_ref().map(|table| table as &dyn Chunked),
         }
+    }
+
+    /// Of companions of flat blocks' samples: a word for each block as shaders read it, with the companion of one that is one sample.
+    pub fn one_table(&self) -> Option<&dyn Chunked> {
+        self.ones.as_ref().and(self.table.as_ref()).map(|table| table as &dyn Chunked)
     }
 
     /// The slots, whose table keeps the identity of the pages that are equal to pages of slots before them: a device is
@@ -285,13 +333,14 @@ impl Slots {
         self.samples(slot).is_some() || self.one_sample(slot).is_some()
     }
 
-    /// The stored number of a flat block that is one sample, which is in its row.
+    /// The stored number of a flat block that is one sample, which is in its row; of companions, their word.
     #[inline]
     pub fn one_sample(&self, slot: u32) -> Option<f64> {
         let Places::Blocks(places) = &self.places else { return None };
-        match places.rows().get(slot as usize)?.samples {
-            BlockSamples::One(read) => Some(self.format.stored(read)),
-            BlockSamples::Texture(_) => None,
+        match (places.rows().get(slot as usize)?.samples, &self.ones) {
+            (BlockSamples::One(_), Some(words)) => Some(f64::from(words[slot as usize])),
+            (BlockSamples::One(read), None) => Some(self.format.stored(read)),
+            (BlockSamples::Texture(_), _) => None,
         }
     }
 
@@ -329,7 +378,7 @@ impl Slots {
             SampleFormat::Unorm8 | SampleFormat::Unorm16 => {
                 ((value - self.decode.offset) / self.decode.scale * unit).round().clamp(0.0, unit)
             }
-            SampleFormat::Float32 => 0.0,
+            SampleFormat::Float32 | SampleFormat::Unorm8x4 => 0.0,
         }
     }
 }
@@ -428,6 +477,8 @@ impl Chunked for PlaceTable {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::BlockRow;
+    use brickfield_core::{BlockLayout, BlockSide};
 
     #[test]
     fn a_rescale_follows_the_decoding() {
@@ -470,5 +521,30 @@ mod tests {
         assert_eq!(table(UVec3::new(2, 1, 3), 6), Ok(6));
         assert_eq!(table(UVec3::ZERO, 5), Err(SlotsError::Bytes { slot: 0, n_bytes: 5, expected: 6 }));
         assert!(table(UVec3::new(2, 2, 0), 6).unwrap_err().to_string().contains("in a texture of [4, 4, 4] texels"));
+    }
+
+    #[test]
+    fn companions_lie_at_their_samples_and_fill_them() {
+        let layout = BlockLayout::new(UVec3::new(16, 8, 8), BlockSide::V8);
+        let row = |level, samples| BlockRow { level: Level(level), samples };
+        let rows = vec![row(1, BlockSamples::Texture(UVec3::ZERO)), row(3, BlockSamples::One(0.5))];
+        let places = Places::Blocks(BlockPlaces::new(layout, UVec3::splat(8), rows));
+        let decode = Decode { scale: 1.0, offset: 0.0 };
+        let chunk = |n| Some(Arc::new(Chunk::new(vec![7; n])));
+        let values = Slots::new(SampleFormat::Unorm16, decode, places, vec![chunk(128), None]).unwrap();
+        let of = |n, ones: &[u32]| values.companions(SampleFormat::Unorm8, decode, vec![chunk(n), None], ones.to_vec());
+        let spreads = of(64, &[0, 200]).unwrap();
+        assert!(spreads.are_companions_of(&values) && !values.are_companions_of(&values));
+        assert_eq!(
+            (values.one_sample(1), spreads.one_sample(1), spreads.one_sample(0)),
+            (Some(32768.0), Some(200.0), None)
+        );
+        assert!(spreads.block_table().is_none() && values.one_table().is_none());
+        assert_eq!(spreads.one_table().unwrap().chunk(0).unwrap().1, bytemuck::bytes_of(&[0u32, 200]));
+        assert_eq!(of(128, &[0, 200]), Err(SlotsError::Bytes { slot: 0, n_bytes: 128, expected: 64 }));
+        assert_eq!(of(64, &[0]), Err(SlotsError::Places { n_places: 2, n_slots: 1 }));
+        let bricks = Slots::even(BrickSide::S16, SampleFormat::Unorm8, decode, &[]).unwrap();
+        let refused = bricks.companions(SampleFormat::Unorm8, decode, Vec::new(), Vec::new());
+        assert!(refused.unwrap_err().to_string().starts_with("companions of bricks"));
     }
 }

@@ -1,6 +1,7 @@
 //! The options that the `brickfield` command shares with the conformance runs.
 
 mod blocks;
+mod light;
 pub mod values;
 
 use std::path::{Path, PathBuf};
@@ -20,6 +21,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 pub use blocks::{BlockArgs, BlockSubject, Blocks};
+pub use light::LightOptions;
 
 #[cfg(feature = "formats")]
 use crate::StoreBlocks;
@@ -219,6 +221,8 @@ pub enum OptionError {
     NoSuchTransfer { name: String, presets: String },
     #[error("--camera: {0}")]
     Camera(#[from] brickfield_core::CameraError),
+    #[error("--light: {0}")]
+    Light(#[from] brickfield_optics::LightError),
     #[error("--clip: the box from {} to {} lies outside of the volume's {} x {} x {} voxels", clip.min, clip.max, dims.x, dims.y, dims.z)]
     ClipOutside { clip: Aabb, dims: UVec3 },
     #[error("{first} and {second} exclude each other: {reason}")]
@@ -235,6 +239,7 @@ impl OptionError {
             | OptionError::BlockLevel { .. }
             | OptionError::NoSuchTransfer { .. }
             | OptionError::Camera(_)
+            | OptionError::Light(_)
             | OptionError::ClipOutside { .. }
             | OptionError::Exclude { .. } => true,
         }

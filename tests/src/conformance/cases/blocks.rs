@@ -17,7 +17,7 @@ use crate::volumes::spread;
 
 /// The scheme, with the inside of transparent blocks drawn as any other: the plan without skipping is the same field.
 fn blended(scheme: Interblock) -> BlockStyle {
-    BlockStyle { join: Join::Blend(scheme), transparent: TransparentBlocks::Blended, slices: Slices::Together }
+    BlockStyle { join: Join::Blend(scheme), transparent: TransparentBlocks::Blended, ..BlockStyle::default() }
 }
 
 /// Blocks of random resolutions, the last ones short.
@@ -75,16 +75,19 @@ fn pictures() -> Vec<Case> {
                 (s.division, s.placement) = (Division::Brick, Placement::ViewportPlanes);
             })
         }),
-        picture(
-            "blocks/polygons",
-            catches![shader::MAXIMUM_TO_THE_FACE, PolygonsReversed, BetweenMissing],
-            move || {
-                random(u8, BlockSide::V16, blended(MaximumDistance)).with(|s| {
-                    (s.division, s.placement) = (Division::Brick, Placement::ObjectPlanes);
-                    s.technique = Technique::Polygons(Target::Float32);
-                })
-            },
-        ),
+        picture("blocks/polygons", catches![shader::MAXIMUM_TO_THE_FACE, PolygonsReversed], move || {
+            random(u8, BlockSide::V16, blended(MaximumDistance)).with(|s| {
+                (s.division, s.placement) = (Division::Brick, Placement::ObjectPlanes);
+                s.technique = Technique::Polygons(Target::Float32);
+            })
+        }),
+        picture("blocks/interiors-first", catches![BetweenMissing, PolygonsReversed], move || {
+            let style = BlockStyle { slices: Slices::InteriorsFirst, ..blended(BoundarySplit) };
+            random(u16, BlockSide::V8, style).rule(QuadratureRule::Gauss2).with(|s| {
+                (s.division, s.placement) = (Division::Brick, Placement::ViewportPlanes);
+                s.technique = Technique::Polygons(Target::Float32);
+            })
+        }),
         picture("blocks/all-of-level-2", catches![shader::NEAREST, DecodeOffset], move || {
             Setup::new(hills(&grid(), u16), soft(u16)).blocks(
                 BlockSide::V8,

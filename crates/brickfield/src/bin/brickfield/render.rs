@@ -24,12 +24,14 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     check_picture_path(&args.out).map_err(Failure::usage)?;
     args.view.check()?;
     args.sampling.check()?;
+    args.light.check()?;
     let mut backend = open(args)?;
     if let Some(side) = args.flat.blocks {
         return render_blocks(args, side, backend.as_mut());
     }
     let subject = Subject::open(&args.file, &args.input, &args.tree, &args.view)?;
     let scene = args.sampling.of(args.view.scene(&subject)?, Some(&subject.volume))?;
+    let scene = args.light.of(scene, subject.volume.range(), subject.tree.grid())?;
     let mut residency = Residency::default();
     let plan = prepare(&subject.tree, &scene, &mut residency).map_err(Failure::usage)?;
     note_if_nothing_shows(&plan);
@@ -53,6 +55,7 @@ fn render_blocks(args: &RenderArgs, side: BlockSide, backend: &mut dyn Backend) 
     let source = subject.blocks.source();
     let scene = args.view.scene_of(source.grid(), subject.frame, &subject.transfer)?;
     let scene = args.sampling.of(scene, subject.blocks.volume())?;
+    let scene = args.light.of(scene, source.range(), source.grid())?;
     let selection = args.flat.select(&subject, &scene)?;
     let (levels, mut residency) = (&selection.levels, BlockResidency::default());
     let plan = prepare_blocks(source, &scene, levels.levels(), args.flat.style(), &mut residency)?;
@@ -82,9 +85,11 @@ fn block_summary(subject: &BlockSubject, levels: &BlockLevels, residency: &Block
         .map(|(level, n)| format!("{n} of level {}", level.0))
         .collect();
     let slots = plan.field().slots();
+    let beside = plan.gradients().map_or(0, |gradients| gradients.n_bytes() as u64);
+    let beside = if beside > 0 { format!(", gradients {:.1} MiB", mib(beside)) } else { String::new() };
     let free = residency.n_free_texels() * slots.format().n_bytes() as u64;
     format!(
-        "flat blocks of {}: {}; {:.1}:1\nkept {:.1} MiB, {:.1} MiB of the texture free; with ghost layers {:.1} MiB (one side), {:.1} MiB (both)\n",
+        "flat blocks of {}: {}; {:.1}:1\nkept {:.1} MiB{beside}, {:.1} MiB of the texture free; with ghost layers {:.1} MiB (one side), {:.1} MiB (both)\n",
         layout.side(),
         by_level.join(", "),
         memory.ratio(),

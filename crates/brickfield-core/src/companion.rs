@@ -1,0 +1,49 @@
+//! What samples have besides their value.
+
+use std::fmt;
+
+/// A second datum of every sample, kept beside the values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Companion {
+    /// How far the voxels that a sample averages lie around it: half the width of the uniform distribution that stands for them.
+    ///
+    /// That is sqrt(3) standard deviations, or less: the distribution does not leave the range of these voxels. 0 at level 0. One byte,
+    /// in 255ths of the source's greatest spread: the nearest that does not leave the range either.
+    Spread,
+    /// The gradient of the field: the Sobel operator at level 0, averaged at others (Ljung, Lundstroem and Ynnerman 2006, section 5).
+    ///
+    /// Four bytes. The first three are the direction of (slope along an axis / spacing), each component c as 127 c + 127
+    /// ([`GRADIENT_ZERO`] stands for 0); the fourth is its length, as 255 times the square root of its part of the source's
+    /// greatest gradient. All to the nearest.
+    Gradient,
+}
+
+/// The byte of a direction's component that is 0.
+pub const GRADIENT_ZERO: u8 = 127;
+
+impl Companion {
+    /// All companions.
+    pub const ALL: [Companion; 2] = [Companion::Spread, Companion::Gradient];
+
+    /// Bytes of a sample.
+    pub const fn n_bytes(self) -> usize {
+        match self {
+            Companion::Spread => 1,
+            Companion::Gradient => 4,
+        }
+    }
+
+    /// The name in messages, of several samples.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Companion::Spread => "spreads",
+            Companion::Gradient => "gradients",
+        }
+    }
+}
+
+impl fmt::Display for Companion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
