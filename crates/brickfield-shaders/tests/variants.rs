@@ -107,7 +107,7 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
         assert!(shader.spirv().unwrap().len() > 100);
         let uses = |resource| shader.uses(resource);
         let is_lit = variant.features.contains(Feature::Light);
-        let draws = matches!(variant.entry, Entry::March | Entry::Proxy);
+        let draws = matches!(variant.entry, Entry::March | Entry::Proxy(_));
         assert_eq!(uses(Resource::Light), is_lit && draws);
         let is_stored = variant.features.contains(Feature::StoredGradients);
         assert_eq!(uses(Resource::Gradients), is_stored && draws);
