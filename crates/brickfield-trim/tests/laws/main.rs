@@ -1,0 +1,5 @@
+//! What trimming must never do, on random fields and transfer functions.
+
+mod blended;
+mod bricks;
+mod field;
