@@ -4,7 +4,10 @@ mod blocks;
 mod bricks;
 mod dark;
 mod keep;
+mod merge;
+mod pack;
 mod slices;
+mod stored;
 
 pub use blocks::{BlocksError, trim_blocks};
 pub use bricks::{
@@ -12,4 +15,9 @@ pub use bricks::{
 };
 pub use dark::{DarkValues, ThresholdError};
 pub use keep::{Class, Interpolation, kept_box};
+pub use merge::{
+    BetweenClusters, ChunkPart, FirstMerge, MergeError, MergeOptions, MergedBricks, TextureChunk, merge_bricks,
+};
+pub use pack::{PackError, PackedBoxes, pack_boxes};
 pub use slices::{BoxError, MinMaxArrays, SampleBox};
+pub use stored::{StoredBricks, TexelAccount, VoxelsError, pack_bricks};

@@ -3,3 +3,4 @@
 mod blended;
 mod bricks;
 mod field;
+mod storage;
