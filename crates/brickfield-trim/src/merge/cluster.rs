@@ -139,9 +139,8 @@ fn merge_between(clusters: &mut [Vec<Draft>], upper: usize, merge: FirstMerge, r
     }
     let (below, above) = (&clusters[upper - 1], &clusters[upper]);
     let pairs = (0..below.len()).flat_map(|i| (0..above.len()).map(move |j| (i, j)));
-    let alone = |(i, j): &(usize, usize)| {
-        [&below[*i], &above[*j]].into_iter().all(|draft| draft.n_clusters == 1 && draft.unmerged().is_some())
-    };
+    // A chunk that is shared already has two bricks.
+    let alone = |(i, j): &(usize, usize)| below[*i].unmerged().is_some() && above[*j].unmerged().is_some();
     let closest = pairs.filter(alone).filter_map(|(i, j)| {
         let (difference, how) = match merge {
             HORIZONTAL => beside(&below[i], &above[j])?,

@@ -3,7 +3,7 @@
 use crate::field::{Field, field, transfer, trilinear};
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{
-    BrickId, BrickLayout, BrickSide, Grid, Level, Rescale, Scalar, TransferFunction, ValueRange, Volume,
+    BrickId, BrickLayout, BrickSide, Grid, Knot, Level, Rescale, Scalar, TransferFunction, ValueRange, Volume,
 };
 use brickfield_trim::*;
 use proptest::prelude::*;
@@ -81,6 +81,23 @@ fn the_intervals_of_object_voxels_alone_lose_what_interpolation_shows() {
     let [nearest, trilinear] = [Interpolation::Nearest, Interpolation::Trilinear].map(kept);
     assert_eq!((nearest.first.x, nearest.n.x), (5, 1));
     assert_eq!((trilinear.first.x, trilinear.n.x), (4, 3));
+}
+
+#[test]
+fn a_box_that_moves_is_named() {
+    // Slice x has the value x: a peak that moves along the values moves the box.
+    let grid = Grid::axis_aligned(UVec3::new(16, 2, 2), DVec3::ONE).unwrap();
+    let volume = Volume::new(grid, (0..64u8).map(|i| i % 16).collect::<Vec<u8>>()).unwrap();
+    let arrays = BrickArrays::of_volume(&volume, BrickSide::S16);
+    let peak_at = |value: f64| {
+        let knot = |value, extinction| Knot { value, extinction, color: [1.0; 3] };
+        let knots = vec![knot(value - 1.0, 0.0), knot(value, 1.0), knot(value + 1.0, 0.0)];
+        DarkValues::of(&TransferFunction::new(knots).unwrap())
+    };
+    let mut trimmed = trim_bricks(&arrays, &peak_at(4.0), Interpolation::Trilinear);
+    assert_eq!((trimmed.kept()[0].first.x, trimmed.kept()[0].n.x), (3, 3));
+    assert_eq!(reclassify(&mut trimmed, &arrays, &peak_at(9.0)), Ok(vec![0]));
+    assert_eq!((trimmed.kept()[0].first.x, trimmed.kept()[0].n.x), (8, 3));
 }
 
 proptest! {

@@ -3,4 +3,5 @@
 mod blended;
 mod bricks;
 mod field;
+mod figures;
 mod storage;
