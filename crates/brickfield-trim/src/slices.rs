@@ -120,30 +120,34 @@ pub(crate) fn scan<T: Scalar>(samples: &[T], dims: UVec3, of: SampleBox, rescale
     let [x0, y0, z0] = of.first.to_array().map(|i| i as usize);
     let [dx, dy, _] = dims.to_array().map(|d| d as usize);
     let row = |y: usize, z: usize| &samples[x0 + dx * (y0 + y + dy * (z0 + z))..][..nx];
-    let (mut x_min, mut x_max) = (row(0, 0).to_vec(), row(0, 0).to_vec());
-    let mut along_y = vec![Lanes::of(row(0, 0)[0]); ny];
-    let mut along_z = Vec::with_capacity(nz);
-    for z in 0..nz {
-        let mut slice = Lanes::of(row(0, z)[0]);
+    // Each of the lanes of `along_x` is a slice; those of y and z are parts of a slice.
+    let mut along_x: Vec<Lanes<T>> = groups(row(0, 0)).map(Lanes::of).collect();
+    let mut along_y: Vec<Lanes<T>> = (0..ny).map(|y| Lanes::of([row(y, 0)[0]; N_LANES])).collect();
+    let mut along_z: Vec<Lanes<T>> = (0..nz).map(|z| Lanes::of([row(0, z)[0]; N_LANES])).collect();
+    for (z, slice) in along_z.iter_mut().enumerate() {
         for (y, of_y) in along_y.iter_mut().enumerate() {
-            let row = row(y, z);
-            for ((v, min), max) in row.iter().zip(&mut x_min).zip(&mut x_max) {
-                *min = least(*v, *min);
-                *max = greatest(*v, *max);
-            }
-            let of_row = Lanes::of_row(row);
-            slice.add(&of_row);
-            // The first row of y is counted from the first slice on, whatever its lanes began with.
-            match z {
-                0 => *of_y = of_row,
-                _ => of_y.add(&of_row),
+            for (group, of_x) in groups(row(y, z)).zip(&mut along_x) {
+                of_x.add(&group);
+                of_y.add(&group);
+                slice.add(&group);
             }
         }
-        along_z.push(slice.range(rescale));
     }
-    let along_x = x_min.iter().zip(&x_max).map(|(min, max)| range(*min, *max, rescale)).collect();
-    let along_y = along_y.iter().map(|lanes| lanes.range(rescale)).collect();
-    MinMaxArrays { along: [along_x, along_y, along_z.into_boxed_slice()] }
+    let along_x = (0..nx).map(|x| along_x[x / N_LANES].lane(x % N_LANES, rescale)).collect();
+    let [along_y, along_z] = [along_y, along_z].map(|all| all.iter().map(|lanes| lanes.range(rescale)).collect());
+    MinMaxArrays { along: [along_x, along_y, along_z] }
+}
+
+/// A row in groups of samples that are compared at once; the last group is filled with its first sample.
+#[inline]
+fn groups<T: Scalar>(row: &[T]) -> impl Iterator<Item = [T; N_LANES]> {
+    let (full, rest) = row.as_chunks::<N_LANES>();
+    let filled = rest.first().map(|first| {
+        let mut group = [*first; N_LANES];
+        group[..rest.len()].copy_from_slice(rest);
+        group
+    });
+    full.iter().copied().chain(filled)
 }
 
 /// The least and greatest of some samples, in parts that are compared at once.
@@ -156,29 +160,20 @@ struct Lanes<T> {
 const N_LANES: usize = 16;
 
 impl<T: Scalar> Lanes<T> {
-    fn of(value: T) -> Lanes<T> {
-        Lanes { min: [value; N_LANES], max: [value; N_LANES] }
-    }
-
-    fn of_row(row: &[T]) -> Lanes<T> {
-        let mut lanes = Lanes::of(row[0]);
-        let (groups, rest) = row.as_chunks::<N_LANES>();
-        for group in groups {
-            lanes.add(&Lanes { min: *group, max: *group });
-        }
-        for (lane, v) in rest.iter().enumerate() {
-            lanes.min[lane] = least(*v, lanes.min[lane]);
-            lanes.max[lane] = greatest(*v, lanes.max[lane]);
-        }
-        lanes
+    fn of(group: [T; N_LANES]) -> Lanes<T> {
+        Lanes { min: group, max: group }
     }
 
     #[inline]
-    fn add(&mut self, other: &Lanes<T>) {
+    fn add(&mut self, group: &[T; N_LANES]) {
         for lane in 0..N_LANES {
-            self.min[lane] = least(other.min[lane], self.min[lane]);
-            self.max[lane] = greatest(other.max[lane], self.max[lane]);
+            self.min[lane] = least(group[lane], self.min[lane]);
+            self.max[lane] = greatest(group[lane], self.max[lane]);
         }
+    }
+
+    fn lane(&self, lane: usize, rescale: Rescale) -> ValueRange {
+        range(self.min[lane], self.max[lane], rescale)
     }
 
     fn range(&self, rescale: Rescale) -> ValueRange {

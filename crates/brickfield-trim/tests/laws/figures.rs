@@ -16,26 +16,36 @@ fn ball() -> Volume {
     Volume::new(grid, (0..N.pow(3)).map(value).collect::<Vec<u8>>()).unwrap()
 }
 
+/// Boxes, texels, and texels of padding.
+fn numbers(account: TexelAccount) -> (usize, u64, u64) {
+    (account.n_boxes, account.n_texels, account.n_padding())
+}
+
+fn trimmed(side: BrickSide) -> TrimmedBricks {
+    let arrays = BrickArrays::of_volume(&ball(), side);
+    trim_bricks(&arrays, &DarkValues::below(100.0).unwrap(), Interpolation::Trilinear)
+}
+
 #[test]
-fn texels_of_a_ball() {
-    let arrays = BrickArrays::of_volume(&ball(), BrickSide::S64);
-    let trimmed = trim_bricks(&arrays, &DarkValues::below(100.0).unwrap(), Interpolation::Trilinear);
-    let merged = |first, between| {
-        let options = MergeOptions { first, between, ..MergeOptions::default() };
-        merge_bricks(&trimmed, &options).unwrap().after()
-    };
-    let first = merge_bricks(&trimmed, &MergeOptions::default()).unwrap();
-    let account = |a: TexelAccount| (a.n_boxes, a.n_texels >> 10, a.n_padding() >> 10);
-    println!("{:?}", trimmed.counts());
-    println!("{:?}", account(first.before()));
-    println!("HA {:?}", account(merged(FirstMerge::Horizontal, BetweenClusters::Apart)));
-    println!("HZ {:?}", account(merged(FirstMerge::Horizontal, BetweenClusters::AlongZ)));
-    println!("VA {:?}", account(merged(FirstMerge::Vertical, BetweenClusters::Apart)));
-    println!("VZ {:?}", account(merged(FirstMerge::Vertical, BetweenClusters::AlongZ)));
-    println!("store {:?}", account(first.store(UVec3::splat(2048)).unwrap().account()));
-    for side in BrickSide::ALL {
-        let arrays = BrickArrays::of_volume(&ball(), side);
-        let trimmed = trim_bricks(&arrays, &DarkValues::below(100.0).unwrap(), Interpolation::Trilinear);
-        println!("pack {side} {:?}", account(pack_bricks(&trimmed, UVec3::splat(2048)).unwrap().account()));
-    }
+fn a_ball_in_texture_chunks() {
+    let trimmed = trimmed(BrickSide::S64);
+    assert_eq!(trimmed.counts(), ClassCounts { n_white: 93, n_grey: 24, n_black: 8 });
+    let merged =
+        |first, between| merge_bricks(&trimmed, &MergeOptions { first, between, ..MergeOptions::default() }).unwrap();
+    use {BetweenClusters::*, FirstMerge::*};
+    assert_eq!(numbers(merged(Horizontal, Apart).before()), (32, 3_768_320, 0));
+    assert_eq!(numbers(merged(Horizontal, Apart).after()), (24, 3_833_856, 65_536));
+    assert_eq!(numbers(merged(Horizontal, AlongZ).after()), (16, 5_373_952, 1_605_632));
+    assert_eq!(numbers(merged(Vertical, AlongZ).after()), (16, 4_751_360, 983_040));
+    // Chunks leave no texel between them.
+    let stored = merged(Horizontal, AlongZ).store(UVec3::splat(2048)).unwrap().account();
+    assert_eq!(numbers(stored), (32, 5_373_952, 1_605_632));
+}
+
+#[test]
+fn a_ball_in_packed_boxes() {
+    let packed = |side| numbers(pack_bricks(&trimmed(side), UVec3::splat(2048)).unwrap().account());
+    assert_eq!(packed(BrickSide::S64), (32, 3_841_600, 805_684));
+    assert_eq!(packed(BrickSide::S32), (151, 3_379_200, 515_823));
+    assert_eq!(packed(BrickSide::S16), (890, 3_020_800, 180_873));
 }
