@@ -166,9 +166,9 @@ impl<T: Scalar> Lanes<T> {
 
     #[inline]
     fn add(&mut self, group: &[T; N_LANES]) {
-        for lane in 0..N_LANES {
-            self.min[lane] = least(group[lane], self.min[lane]);
-            self.max[lane] = greatest(group[lane], self.max[lane]);
+        for ((v, min), max) in group.iter().zip(&mut self.min).zip(&mut self.max) {
+            *min = least(*v, *min);
+            *max = greatest(*v, *max);
         }
     }
 

@@ -7,9 +7,9 @@ use crate::{PackError, SampleBox, TrimmedBricks, brick_samples, pack_boxes};
 
 /// Trimmed bricks in one texture: for each brick with something to see, the place of its samples in the texture and in space.
 ///
-/// A field's table of places needs no more; a brick without place is empty in the field's index. With [`Interpolation::Trilinear`]
-/// (`crate::Interpolation`) a position beyond a place's samples may be moved to them, as everywhere in this project: the value there is
-/// dark as well.
+/// A field's table of places needs no more; a brick without place is empty in the field's index. With
+/// [`Interpolation::Trilinear`](crate::Interpolation::Trilinear) a position beyond a place's samples may be moved to them, as a field
+/// does: the value there is dark as well. With `Nearest` it must not be drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StoredBricks {
     layout: BrickLayout,

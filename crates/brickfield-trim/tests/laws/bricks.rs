@@ -3,7 +3,7 @@
 use crate::field::{Field, field, transfer, trilinear};
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{
-    BrickId, BrickLayout, BrickSide, Grid, Knot, Level, Rescale, Scalar, TransferFunction, ValueRange, Volume,
+    BrickId, BrickLayout, BrickSide, Grid, Knot, Level, Rescale, TransferFunction, ValueRange, Volume,
 };
 use brickfield_trim::*;
 use proptest::prelude::*;
@@ -113,7 +113,7 @@ proptest! {
     fn arrays_are_the_least_and_greatest_of_each_slice(field in field(40), slope in prop::sample::select(vec![1.0, -0.5])) {
         let rescale = Rescale::new(slope, 3.0).unwrap();
         let grid = *field.volume().grid();
-        fn check<T: Scalar>(field: &Field, volume: &Volume) {
+        fn check(field: &Field, volume: &Volume) {
             let arrays = BrickArrays::of_volume(volume, BrickSide::S16);
             for (brick, arrays) in bricks(arrays.layout()).zip(arrays.arrays()) {
                 for axis in 0..3 {
@@ -130,9 +130,9 @@ proptest! {
                 }
             }
         }
-        check::<u8>(&field, &Volume::rescaled(grid, field.voxels(), rescale).unwrap());
+        check(&field, &Volume::rescaled(grid, field.voxels(), rescale).unwrap());
         let floats: Vec<f32> = field.voxels().into_iter().map(f32::from).collect();
-        check::<f32>(&field, &Volume::rescaled(grid, floats, rescale).unwrap());
+        check(&field, &Volume::rescaled(grid, floats, rescale).unwrap());
     }
 
     #[test]
