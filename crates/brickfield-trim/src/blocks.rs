@@ -2,8 +2,8 @@
 
 use std::cmp::Ordering;
 
-use brickfield_core::glam::UVec3;
-use brickfield_core::{BlockLayout, Level, ValueRange};
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{Axes, BlockLayout, Level, Place, ValueRange};
 use rayon::prelude::*;
 
 use crate::keep::{box_of, ends};
@@ -54,6 +54,21 @@ pub fn trim_blocks(
     Ok((0..arrays.len()).into_par_iter().map(|ordinal| blocks.kept_box(layout.block(ordinal))).collect())
 }
 
+/// The place of the kept samples of a flat block, from a texel on, whose texture runs along the axes of space.
+///
+/// # Panics
+/// If nothing is kept, or the block has not these samples at this level.
+pub fn block_place(layout: &BlockLayout, block: UVec3, level: Level, kept: &SampleBox, texel: UVec3) -> Place {
+    let (n, end) = (layout.n_samples(block, level), kept.first + kept.n);
+    assert!(!kept.is_empty() && end.cmple(n).all(), "{kept:?} of a block of {n} samples");
+    let (first, last) = layout.sample_ends(block, level);
+    let position = |sample: UVec3| {
+        let before_last = first + sample.as_dvec3() * f64::from(level.stride());
+        DVec3::select((sample + 1).cmpeq(n), last, before_last)
+    };
+    Place { texel, n: kept.n, level, first: position(kept.first), last: position(end - 1), axes: Axes::Xyz }
+}
+
 fn check(layout: &BlockLayout, levels: &[Level], arrays: &[MinMaxArrays]) -> Result<(), BlocksError> {
     let n_blocks = layout.n_blocks_total();
     for (what, n_found) in [("levels", levels.len()), ("min-max arrays", arrays.len())] {
@@ -88,6 +103,21 @@ struct Stretch {
     to: f64,
 }
 
+/// Where the slices of a block lie along an axis; the last gap may be shorter than the others.
+#[derive(Clone, Copy)]
+struct Row {
+    first: f64,
+    last: f64,
+    stride: f64,
+    n: usize,
+}
+
+impl Row {
+    fn position(&self, slice: usize) -> f64 {
+        if slice + 1 == self.n { self.last } else { self.first + slice as f64 * self.stride }
+    }
+}
+
 impl Blocks<'_> {
     fn kept_box(&self, block: UVec3) -> SampleBox {
         let around: Vec<UVec3> = self.around(block).collect();
@@ -111,11 +141,10 @@ impl Blocks<'_> {
         let may_count = |other: &UVec3| {
             let mut beside = *other;
             beside[axis] = block[axis];
-            let (first, last) = self.layout.sample_ends(beside, self.level(beside));
             match other[axis].cmp(&block[axis]) {
-                Ordering::Less => stretch.from < first[axis],
+                Ordering::Less => stretch.from < self.row(beside, axis).first,
                 Ordering::Equal => true,
-                Ordering::Greater => stretch.to > last[axis],
+                Ordering::Greater => stretch.to > self.row(beside, axis).last,
             }
         };
         let own = self.slices_at(block, axis, stretch);
@@ -124,22 +153,22 @@ impl Blocks<'_> {
 
     /// Where a gap lies along an axis: between two slices, or from an outer slice to the neighbour's, or to the volume's end.
     fn stretch(&self, block: UVec3, axis: usize, gap: usize) -> Stretch {
-        let n = self.arrays(block).along(axis).len();
+        let own = self.row(block, axis);
         let mut beside = block;
         let from = match gap {
             0 if block[axis] == 0 => f64::NEG_INFINITY,
             0 => {
                 beside[axis] -= 1;
-                self.layout.sample_ends(beside, self.level(beside)).1[axis]
+                self.row(beside, axis).last
             }
-            _ => self.position(block, axis, gap - 1),
+            _ => own.position(gap - 1),
         };
         let to = match gap {
-            _ if gap < n => self.position(block, axis, gap),
+            _ if gap < own.n => own.position(gap),
             _ if block[axis] + 1 == self.layout.n_blocks()[axis] => f64::INFINITY,
             _ => {
                 beside[axis] = block[axis] + 1;
-                self.layout.sample_ends(beside, self.level(beside)).0[axis]
+                self.row(beside, axis).first
             }
         };
         Stretch { from, to }
@@ -147,20 +176,17 @@ impl Blocks<'_> {
 
     /// The values of the slices of a block that interpolation reads in a stretch, which is limited to the block's samples.
     fn slices_at(&self, block: UVec3, axis: usize, stretch: Stretch) -> ValueRange {
-        let slices = self.arrays(block).along(axis);
-        let first = (0..slices.len()).rfind(|i| self.position(block, axis, *i) <= stretch.from).unwrap_or(0);
-        let last = (first..slices.len()).find(|i| self.position(block, axis, *i) >= stretch.to);
-        union(&slices[first..=last.unwrap_or(slices.len() - 1)])
+        let (slices, row) = (self.arrays(block).along(axis), self.row(block, axis));
+        let first = (0..row.n).rfind(|i| row.position(*i) <= stretch.from).unwrap_or(0);
+        let last = (first..row.n).find(|i| row.position(*i) >= stretch.to).unwrap_or(row.n - 1);
+        union(&slices[first..=last])
     }
 
-    /// Where a slice lies along an axis.
-    fn position(&self, block: UVec3, axis: usize, slice: usize) -> f64 {
+    fn row(&self, block: UVec3, axis: usize) -> Row {
         let level = self.level(block);
         let (first, last) = self.layout.sample_ends(block, level);
-        match slice + 1 == self.arrays(block).along(axis).len() {
-            true => last[axis],
-            false => first[axis] + slice as f64 * f64::from(level.stride()),
-        }
+        let n = self.arrays(block).along(axis).len();
+        Row { first: first[axis], last: last[axis], stride: f64::from(level.stride()), n }
     }
 
     /// The block and all that touch it.

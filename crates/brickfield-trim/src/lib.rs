@@ -9,7 +9,7 @@ mod pack;
 mod slices;
 mod stored;
 
-pub use blocks::{BlocksError, trim_blocks};
+pub use blocks::{BlocksError, block_place, trim_blocks};
 pub use bricks::{
     ArraysError, BrickArrays, ClassCounts, OtherLayout, TrimmedBricks, brick_samples, reclassify, trim_bricks,
 };

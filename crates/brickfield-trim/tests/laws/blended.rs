@@ -181,6 +181,21 @@ proptest! {
     }
 
     #[test]
+    fn places_lead_back_to_the_samples_of_the_block(blocks in blocks(), transfer in transfer()) {
+        for (block, kept) in blocks.layout.blocks().zip(blocks.kept(&transfer)).filter(|(_, kept)| !kept.is_empty()) {
+            let level = blocks.level(block);
+            let place = block_place(&blocks.layout, block, level, &kept, UVec3::new(1, 2, 3));
+            prop_assert_eq!((place.texel, place.n, place.level), (UVec3::new(1, 2, 3), kept.n, level));
+            let (first, last) = blocks.layout.sample_ends(block, level);
+            for i in 0..kept.n.element_product() {
+                let i = UVec3::new(i % kept.n.x, i / kept.n.x % kept.n.y, i / kept.n.x / kept.n.y);
+                let at = (first + (kept.first + i).as_dvec3() * f64::from(level.stride())).min(last);
+                prop_assert!((place.local(at) - i.as_dvec3()).abs().max_element() < 1e-12, "{} at {} of {:?}", i, at, place);
+            }
+        }
+    }
+
+    #[test]
     fn at_least_the_nearest_blocks_own_part_is_kept(blocks in blocks(), transfer in transfer()) {
         let dark = DarkValues::of(&transfer);
         for (alone, blended) in blocks.arrays().iter().zip(blocks.kept(&transfer)) {

@@ -184,6 +184,9 @@ proptest! {
                 let part = merged.parts()[brick].unwrap();
                 prop_assert_eq!(part.chunk, i);
                 prop_assert!((part.texel + part.n()).cmple(chunk.n).all());
+                if let Class::Grey { trimming_axis } = trimmed.class(brick) {
+                    prop_assert_eq!(part.n().z, trimmed.kept()[brick].n[trimming_axis]);
+                }
             }
         }
         for (brick, n) in n_stored.into_iter().enumerate() {
