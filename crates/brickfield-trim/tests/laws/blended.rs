@@ -142,6 +142,45 @@ fn a_block_whose_own_values_are_dark_is_seen_in_its_blend() {
     assert_eq!((kept[1].first.x, kept[1].n.x), (0, 8));
 }
 
+/// The samples of block 1 that are kept where block 2 has a visible slice at voxel `x`, and all else is dark:
+///
+/// ```text
+/// +---------+---------+
+/// |   2 | fine        3 one sample at 11.5    samples of block 2 at 0 to 7
+/// +---------+---------+
+/// | 0 one sample at 3.5  1 | samples at 8.5, 10.5, 12.5, 14.5
+/// +---------+---------+
+/// ```
+fn kept_beside_a_visible_slice(x: u32) -> SampleBox {
+    let layout = BlockLayout::new(UVec3::new(16, 16, 1), BlockSide::V8);
+    let levels = [3, 1, 0, 3].map(Level);
+    let arrays = |(block, level): (UVec3, Level)| {
+        let n = layout.n_samples(block, level);
+        let value = |i: u32| match level {
+            Level(0) if i % n.x == x => 9,
+            Level(1) => 5 * (i % 2) as u8,
+            _ => 0,
+        };
+        let samples: Vec<u8> = (0..n.element_product()).map(value).collect();
+        MinMaxArrays::of_box(&samples, n, SampleBox::whole(n), Rescale::IDENTITY).unwrap()
+    };
+    let arrays: Vec<MinMaxArrays> = layout.blocks().zip(levels).map(arrays).collect();
+    trim_blocks(&layout, &levels, &arrays, &DarkValues::below(8.0).unwrap()).unwrap()[1]
+}
+
+#[test]
+fn a_finer_block_across_an_edge_is_seen_as_far_as_coarser_ones_let_it() {
+    // Block 1 counts from 3.5 on, past slice 5 of block 2.
+    let kept = kept_beside_a_visible_slice(5);
+    assert_eq!((kept.first.x, kept.n.x), (0, 1));
+    // The outer slice of block 2 counts as far as 11.5, and from 3.5 on along y.
+    let kept = kept_beside_a_visible_slice(7);
+    assert_eq!((kept.first.x, kept.n.x), (0, 3));
+    assert_eq!((kept.first.y, kept.n.y), (1, 3));
+    // Slice 2 lies before block 1 counts.
+    assert_eq!(kept_beside_a_visible_slice(2), SampleBox::EMPTY);
+}
+
 #[test]
 fn blocks_that_do_not_fit_are_named() {
     let (layout, arrays) = step();
