@@ -12,6 +12,7 @@ pub mod ljung;
 pub mod metrics;
 pub mod orders;
 pub mod paper;
+mod peak;
 pub mod report;
 pub mod turns;
 pub mod volumes;

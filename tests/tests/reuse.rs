@@ -133,6 +133,7 @@ fn parts(bricks: &[Option<Brick>]) -> PlanParts {
         domain,
         sampling,
         transfer: fog(),
+        lighting: None,
         dark: DarkRegions::default(),
         drawing: Drawing::Rays,
     }

@@ -92,8 +92,11 @@ fn steps() -> Result<Vec<Step>> {
     let table = [&of_lamar[..], &rows].concat();
     steps.push(step_with_data("rows of LaMar's table", move || checked("compare", &table).run()));
     let of_ljung = ["--paper", "ljung", "--check=pictures", "--require", "wgpu,ash"];
-    let claims = [&of_ljung[..], &["--part", "gradient,weights,continuity,accounting", "--seeds", "10"]].concat();
+    let claims = [&of_ljung[..], &["--part", "gradient,weights,continuity,light,accounting", "--seeds", "10"]].concat();
     steps.push(step("claims of Ljung, Lundstroem and Ynnerman 2006", move || checked("compare", &claims).run()));
+    let store = ["--part", "store", "--store-dims", "160x128x192", "--store-mib", "1", "--out", "target/store"];
+    let store = [&of_ljung[..], &store].concat();
+    steps.push(step("a store larger than its budget", move || checked("compare", &store).run()));
     let rows = ["--part", "table,rank", "--only", "engine", "--ratios", "32", "--size", "96x96", "--frames", "1"];
     let table = [&of_ljung[..], &rows].concat();
     steps.push(step_with_data("rows of Ljung's table", move || checked("compare", &table).run()));

@@ -101,7 +101,7 @@ impl AshBackend {
     fn rasterise(&mut self, plan: &FramePlan, proxy: &Arc<ProxyGeometry>) -> Result<Frame, RenderError> {
         let (started, target) = (Instant::now(), proxy.target());
         let canvas = reserve_canvas(&mut self.canvas, &self.device, target, plan.size())?;
-        let variant = Variant::of(plan, Entry::Proxy);
+        let variant = Variant::of(plan, Entry::Proxy(proxy.slices()));
         let pipeline = self.variants.blending_into(&self.device, variant, target)?;
         let brought = self.resources.bring(&mut self.queue, &mut self.staging, plan, pipeline)?;
         let of_polygons = self.polygons.bring(&self.device, &mut self.queue, &mut self.staging, proxy)?;

@@ -147,6 +147,8 @@ pub(crate) fn check_format(device: &Device, format: SampleFormat, filtered: bool
     let what = match (format, filtered) {
         (SampleFormat::Unorm8, false) => "read textures of 8-bit samples",
         (SampleFormat::Unorm8, true) => "filter textures of 8-bit samples, as fast mode does",
+        (SampleFormat::Unorm8x4, false) => "read textures of four 8-bit numbers",
+        (SampleFormat::Unorm8x4, true) => "filter textures of four 8-bit numbers, as fast mode does",
         (SampleFormat::Unorm16, false) => "read textures of 16-bit samples",
         (SampleFormat::Unorm16, true) => "filter textures of 16-bit samples, as fast mode does",
         (SampleFormat::Float32, false) => "read textures of 32-bit floats",

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use brickfield_bricks::{
     BlockBuildError, BlockOptions, BlockSource, BlockVolume, NoSuchBlock, block_memory, build_blocks, fetch_values,
-    greatest_spread,
+    greatest_gradient, greatest_spread,
 };
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{
@@ -24,6 +24,38 @@ fn blocks(volume: &Volume, side: BlockSide) -> BlockVolume {
 fn all(layout: &BlockLayout) -> impl Iterator<Item = (UVec3, Level)> {
     let side = layout.side();
     layout.blocks().flat_map(move |block| side.levels().map(move |level| (block, level)))
+}
+
+/// The gradient at a voxel along the grid's axes, in data values per world unit; beyond the volume's faces its outer voxels are repeated.
+fn sobel(volume: &Volume, i: usize) -> DVec3 {
+    let dims = volume.grid().dims().as_ivec3();
+    let p = (0..3).scan(i as i32, |rest, axis| {
+        let at = *rest % dims[axis];
+        *rest /= dims[axis];
+        Some(at)
+    });
+    let p: Vec<i32> = p.collect();
+    let along = [0, 1, 2].map(|axis: usize| {
+        let value = |way: i32, j: i32, k: i32| {
+            let mut q = [p[0], p[1], p[2]];
+            (q[axis], q[(axis + 1) % 3], q[(axis + 2) % 3]) =
+                (q[axis] + way, q[(axis + 1) % 3] + j, q[(axis + 2) % 3] + k);
+            let [x, y, z] = [0, 1, 2].map(|a| q[a].clamp(0, dims[a] - 1));
+            volume.value((x + dims.x * (y + dims.y * z)) as usize)
+        };
+        let distance = (p[axis] + 1).min(dims[axis] - 1) - (p[axis] - 1).max(0);
+        let across = (-1..=1).flat_map(|j: i32| (-1..=1).map(move |k: i32| (j, k)));
+        let weighted =
+            across.map(|(j, k)| f64::from((2 - j.abs()) * (2 - k.abs())) / 16.0 * (value(1, j, k) - value(-1, j, k)));
+        weighted.sum::<f64>() / f64::from(distance.max(1)) / volume.grid().spacing()[axis]
+    });
+    DVec3::from(along)
+}
+
+/// A stored gradient in parts of the greatest.
+fn decoded([x, y, z, root]: [u8; 4]) -> DVec3 {
+    let direction = (DVec3::new(x.into(), y.into(), z.into()) - 127.0) / 127.0;
+    direction * (f64::from(root) / 255.0).powi(2)
 }
 
 fn dims() -> impl Strategy<Value = UVec3> {
@@ -148,6 +180,28 @@ proptest! {
                 let expected = if variance > 0.0 { variance.sqrt() / greatest * 255.0 } else { 0.0 };
                 prop_assert!((f64::from(code) - expected).abs() <= 0.5 + 1e-6, "{code} for {expected}");
                 prop_assert!(level > Level(0) || code == 0);
+            }
+        }
+    }
+
+    #[test]
+    fn gradients_are_averages_of_sobels(volume in volumes(), side in side()) {
+        let source = blocks(&volume, side);
+        let (layout, greatest) = (source.layout(), greatest_gradient(&source));
+        for (block, level) in all(layout) {
+            let mut codes = Vec::new();
+            source.fetch_companion(Companion::Gradient, block, level, &mut codes).unwrap();
+            let n = layout.n_samples(block, level);
+            prop_assert_eq!(codes.len(), 4 * n.element_product() as usize);
+            for (code, sample) in codes.as_chunks().0.iter().zip(points(n)) {
+                let voxels: Vec<usize> = covered(layout, block, level, sample).collect();
+                let sum: DVec3 = voxels.iter().map(|i| sobel(&volume, *i)).sum();
+                let expected = if greatest > 0.0 { sum / voxels.len() as f64 / greatest } else { DVec3::ZERO };
+                let found = decoded(*code);
+                // Half a code of the length's root, and of each component.
+                let half = 0.5 / 255.0;
+                let off = 2.0 * expected.length().sqrt() * half + half * half + 3f64.sqrt() * 0.5 / 127.0 * found.length();
+                prop_assert!((found - expected).length() <= off + 1e-9, "{found} for {expected}");
             }
         }
     }
@@ -292,7 +346,9 @@ fn what_does_not_exist_is_named() {
     let source = blocks(&noise(UVec3::new(20, 3, 1), ScalarType::U8, 0), BlockSide::V8);
     for (block, level) in [(UVec3::new(3, 0, 0), Level(0)), (UVec3::ZERO, Level(4))] {
         let error = source.fetch(block, level, &mut Vec::new()).unwrap_err();
-        assert_eq!(error.to_string(), format!("block ({}, 0, 0) of level {} cannot be fetched", block.x, level.0));
+        let said =
+            format!("block ({}, 0, 0) of level {} cannot be fetched: there are 3 x 1 x 1 blocks", block.x, level.0);
+        assert!(error.to_string().starts_with(&said), "{error}");
         let cause = error.source().and_then(|cause| cause.downcast_ref::<NoSuchBlock>()).unwrap();
         assert_eq!(cause.to_string(), "there are 3 x 1 x 1 blocks, of levels 0 to 3");
     }

@@ -9,16 +9,26 @@ pub enum Companion {
     ///
     /// One byte: the nearest 255th of the source's greatest spread.
     Spread,
+    /// The gradient of the field: the Sobel operator at level 0, averaged at others (Ljung, Lundstroem and Ynnerman 2006, section 5).
+    ///
+    /// Four bytes. The first three are the direction of (slope along an axis / spacing), each component c as 127 c + 127
+    /// ([`GRADIENT_ZERO`] stands for 0); the fourth is its length, as 255 times the square root of its part of the source's
+    /// greatest gradient. All to the nearest.
+    Gradient,
 }
+
+/// The byte of a direction's component that is 0.
+pub const GRADIENT_ZERO: u8 = 127;
 
 impl Companion {
     /// All companions.
-    pub const ALL: [Companion; 1] = [Companion::Spread];
+    pub const ALL: [Companion; 2] = [Companion::Spread, Companion::Gradient];
 
     /// Bytes of a sample.
     pub const fn n_bytes(self) -> usize {
         match self {
             Companion::Spread => 1,
+            Companion::Gradient => 4,
         }
     }
 
@@ -26,6 +36,7 @@ impl Companion {
     pub const fn name(self) -> &'static str {
         match self {
             Companion::Spread => "spreads",
+            Companion::Gradient => "gradients",
         }
     }
 }

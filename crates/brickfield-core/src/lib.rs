@@ -18,7 +18,7 @@ mod volume;
 pub use block::{BlockLayout, BlockSide, BlockSideError, BlockSummary, Interblock, N_BLOCK_BINS, N_BLOCK_LEVELS};
 pub use brick::{BrickId, Cut, CutError, Level};
 pub use camera::{Camera, CameraError, PixelRays, Projection};
-pub use companion::Companion;
+pub use companion::{Companion, GRADIENT_ZERO};
 pub use glam;
 pub use grid::{Grid, GridError};
 pub use image::{Image, ImageSizeError};

@@ -7,7 +7,7 @@ use brickfield_core::glam::{DVec2, DVec3, UVec2, UVec3};
 use brickfield_core::{BrickLayout, BrickSide, Camera, IndexPos, Level, Projection, ScalarType, TransferFunction};
 use brickfield_frame::{
     Division, Drawing, FramePlan, IndexEntry, Lengths, Placement, PlanParts, PlanRay, ProxyCorner, ProxyGeometry,
-    Target,
+    Slices, Target,
 };
 use proptest::prelude::*;
 use support::Setup;
@@ -133,7 +133,7 @@ proptest! {
         };
         let layout = BrickLayout::new(volume.grid().dims(), side);
         let cells: Vec<UVec3> = layout.bricks(Level(0)).map(|id| id.coords).filter(is_first).collect();
-        let drawing = Drawing::Polygons { back_to_front: cells.clone(), target: Target::Float32 };
+        let drawing = Drawing::Polygons { back_to_front: cells.clone(), target: Target::Float32, slices: Slices::Together };
         let plan = FramePlan::new(PlanParts { drawing, ..parts }).unwrap();
         let proxy = plan.proxy().unwrap();
         for (x, y) in (0..13).flat_map(|y| (0..17).map(move |x| (x, y))) {

@@ -84,11 +84,6 @@ impl HeldChunks {
         self.whole == Some(content.id())
     }
 
-    /// Whether something is held in the place of a chunk.
-    pub fn has_any(&self, i: usize) -> bool {
-        self.chunks.get(i).is_some_and(Option::is_some)
-    }
-
     /// The chunks that must be brought, in runs of chunks that follow one another.
     pub fn missing(&self, content: &dyn Chunked) -> Vec<Range<usize>> {
         if self.has_all(content) {

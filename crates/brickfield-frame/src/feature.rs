@@ -18,15 +18,21 @@ pub enum Feature {
     MultiLevel,
     /// Flat blocks at the volume's upper ends have a smaller extent.
     ShortBlocks,
-    /// The transfer function has several knots, and needs a lookup.
+    /// The transfer function has several knots, or light asks for values: they need a lookup.
     TransferLookup,
+    /// Light falls on surfaces.
+    Light,
+    /// The light is elsewhere than the eye.
+    LightBesideEye,
+    /// Normals are of gradients that lie beside the samples.
+    StoredGradients,
     /// Samples have spreads, and nodes the optics that are expected of the values around them.
     Prefiltered,
 }
 
 impl Feature {
     /// All features.
-    pub const ALL: [Feature; 9] = [
+    pub const ALL: [Feature; 12] = [
         Feature::HardwareFilter,
         Feature::EarlyTermination,
         Feature::SkipEmpty,
@@ -35,6 +41,9 @@ impl Feature {
         Feature::MultiLevel,
         Feature::ShortBlocks,
         Feature::TransferLookup,
+        Feature::Light,
+        Feature::LightBesideEye,
+        Feature::StoredGradients,
         Feature::Prefiltered,
     ];
 
@@ -49,6 +58,9 @@ impl Feature {
             Feature::MultiLevel => "multi_level",
             Feature::ShortBlocks => "short_blocks",
             Feature::TransferLookup => "transfer_lookup",
+            Feature::Light => "light",
+            Feature::LightBesideEye => "light_beside_eye",
+            Feature::StoredGradients => "stored_gradients",
             Feature::Prefiltered => "prefiltered",
         }
     }

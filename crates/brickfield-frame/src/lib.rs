@@ -6,6 +6,7 @@ mod content;
 mod facets;
 mod feature;
 mod field;
+mod lighting;
 mod pass;
 mod plan;
 mod probe;
@@ -30,10 +31,11 @@ pub use field::{
     AtlasShape, BlockPlaces, BlockRanges, BlockRow, BlockSamples, Decode, Field, FieldError, IndexEntry, IndexGrid,
     IndexLattice, Join, Packing, Places, Reach, Room, RoomChange, SampleFormat, Slots, SlotsError, TextureShape,
 };
+pub use lighting::{LightUniform, Lighting};
 pub use pass::Pass;
 pub use plan::{Drawing, FramePlan, PlanError, PlanParts};
 pub use probe::{Fetch, Probe, ProbeUniforms, TextureReads, TextureWork};
-pub use proxy::{ProxyCorner, ProxyGeometry, Target};
+pub use proxy::{ProxyCorner, ProxyGeometry, Slices, Target};
 pub use rays::{PlanRay, RayFrame};
 pub use resource::{Content, Resource};
 pub use sampling::{Division, Lengths, Mode, Sampling, SamplingError};

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use brickfield_core::glam::{UVec2, UVec3};
 use brickfield_core::{Aabb, Companion, TransferFunction};
-use brickfield_optics::QuadratureRule;
+use brickfield_optics::{LightSource, Normals, QuadratureRule};
 
 use crate::{
-    Beams, DarkRegions, Division, Feature, FeatureSet, Field, Mode, Occupancy, Placement, ProxyGeometry, RayFrame,
-    SampleFormat, Sampling, Slots, Target, ValueScale,
+    Beams, DarkRegions, Division, Feature, FeatureSet, Field, Lighting, Mode, Occupancy, Placement, ProxyGeometry,
+    RayFrame, SampleFormat, Sampling, Slices, Slots, Target, ValueScale,
 };
 
 /// Everything that a backend needs for one frame, and nothing that this frame does not need.
@@ -23,6 +23,7 @@ pub struct FramePlan {
     pub(crate) visible: Aabb,
     pub(crate) sampling: Sampling,
     pub(crate) transfer: TransferFunction,
+    pub(crate) lighting: Option<Lighting>,
     pub(crate) occupancy: Option<Arc<Occupancy>>,
     pub(crate) beams: Option<Arc<Beams>>,
     pub(crate) proxy: Option<Arc<ProxyGeometry>>,
@@ -42,6 +43,8 @@ pub struct PlanParts {
     pub sampling: Sampling,
     /// Extinction per world unit and colour over data values.
     pub transfer: TransferFunction,
+    /// The light on surfaces; by default none.
+    pub lighting: Option<Lighting>,
     /// The regions that rays leave out; by default none.
     pub dark: DarkRegions,
     /// How backends that can do both make the picture.
@@ -57,8 +60,8 @@ impl PlanParts {
         sampling: Sampling,
         transfer: TransferFunction,
     ) -> PlanParts {
-        let (dark, drawing) = (DarkRegions::default(), Drawing::Rays);
-        PlanParts { field, rays, domain, sampling, transfer, dark, drawing }
+        let (lighting, dark, drawing) = (None, DarkRegions::default(), Drawing::Rays);
+        PlanParts { field, rays, domain, sampling, transfer, lighting, dark, drawing }
     }
 }
 
@@ -75,6 +78,8 @@ pub enum Drawing {
         back_to_front: Vec<UVec3>,
         /// The pixel format that they are blended into.
         target: Target,
+        /// The order of a polygon's fragments.
+        slices: Slices,
     },
 }
 
@@ -87,6 +92,10 @@ pub enum PlanError {
     Domain { domain: Aabb, volume: Aabb },
     #[error("dark regions of another field: rays would pass over samples that are seen")]
     OtherField,
+    #[error(
+        "light on stored normals, of samples without gradients: take normals of central differences, or flat blocks"
+    )]
+    NoGradients,
     #[error("polygons of spherical shells: a sphere has none; take tessellated shells")]
     RoundPolygons,
     #[error("polygons of whole rays: they are clipped to bricks; divide bricks")]
@@ -105,11 +114,12 @@ impl FramePlan {
     /// The plan of some parts.
     ///
     /// # Errors
-    /// A domain outside of the volume; dark regions of another field; spreads with a rule that looks at values between nodes, or without ranges; polygons of surfaces that have none, or of blocks that
+    /// A domain outside of the volume; dark regions of another field; spreads with a rule that looks at values between nodes, or without
+    /// ranges; stored normals without gradients; polygons of surfaces that have none, or of blocks that
     /// are not resident.
     pub fn new(parts: PlanParts) -> Result<FramePlan, PlanError> {
         check(&parts)?;
-        let PlanParts { field, rays, domain, sampling, transfer, dark, drawing } = parts;
+        let PlanParts { field, rays, domain, sampling, transfer, lighting, dark, drawing } = parts;
         let visible = visible_box(&field, &domain);
         let mut plan = FramePlan {
             field,
@@ -118,6 +128,7 @@ impl FramePlan {
             visible,
             sampling,
             transfer,
+            lighting,
             occupancy: dark.occupancy().cloned(),
             beams: None,
             proxy: None,
@@ -125,10 +136,10 @@ impl FramePlan {
         };
         match drawing {
             Drawing::Rays => plan.beams = dark.overview().and_then(|o| Beams::of(&plan, o)).map(Arc::new),
-            Drawing::Polygons { back_to_front, target } => {
+            Drawing::Polygons { back_to_front, target, slices } => {
                 // The interior of bricks is not looked at before it is drawn.
                 plan.occupancy = None;
-                plan.proxy = Some(Arc::new(ProxyGeometry::of(&plan, &back_to_front, target)));
+                plan.proxy = Some(Arc::new(ProxyGeometry::of(&plan, &back_to_front, target, slices)));
             }
         }
         plan.features = plan.needs();
@@ -153,8 +164,12 @@ impl FramePlan {
             (Feature::SkipBesideBeams, self.beams.is_some()),
             (Feature::MultiLevel, self.field.has_coarse()),
             (Feature::ShortBlocks, self.field.has_short_blocks()),
-            (Feature::TransferLookup, self.transfer.knots().len() > 1),
+            // A value is looked up, and its gradient.
+            (Feature::TransferLookup, self.transfer.knots().len() > 1 || self.lighting.is_some()),
             (Feature::Prefiltered, self.spreads().is_some()),
+            (Feature::Light, self.lighting.is_some()),
+            (Feature::StoredGradients, self.gradients().is_some()),
+            (Feature::LightBesideEye, self.lighting.is_some_and(|l| l.light.source() != LightSource::Head)),
         ];
         needed.into_iter().filter_map(|(feature, is_needed)| is_needed.then_some(feature)).collect()
     }
@@ -193,6 +208,18 @@ impl FramePlan {
     #[inline]
     pub fn transfer(&self) -> &TransferFunction {
         &self.transfer
+    }
+
+    /// The light on surfaces; `None` where the medium only emits.
+    #[inline]
+    pub fn lighting(&self) -> Option<&Lighting> {
+        self.lighting.as_ref()
+    }
+
+    /// The gradients of the samples; `None` where none are asked for.
+    pub fn gradients(&self) -> Option<&Arc<Slots>> {
+        let is_asked = self.lighting.is_some_and(|lighting| lighting.light.normals() == Normals::Stored);
+        self.field.companions(Companion::Gradient).filter(|_| is_asked)
     }
 
     /// Which macrocells of bricks are dark; `None` where nothing inside a brick is leapt over.
@@ -269,6 +296,10 @@ fn check(parts: &PlanParts) -> Result<(), PlanError> {
     }
     if field.companions(Companion::Spread).is_some() {
         check_prefiltered(field, parts.sampling.rule())?;
+    }
+    let is_stored = parts.lighting.is_some_and(|lighting| lighting.light.normals() == Normals::Stored);
+    if is_stored && field.companions(Companion::Gradient).is_none() {
+        return Err(PlanError::NoGradients);
     }
     let Drawing::Polygons { back_to_front, .. } = &parts.drawing else { return Ok(()) };
     if parts.rays.placement == Placement::Shells {

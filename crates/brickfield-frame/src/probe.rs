@@ -130,7 +130,7 @@ impl TextureWork {
         let i = x + u64::from(self.texels.x) * (y + u64::from(self.texels.y) * z);
         let bytes: Vec<u8> = self.stored(i).collect();
         match self.format {
-            SampleFormat::Unorm8 => f64::from(bytes[0]) / 255.0,
+            SampleFormat::Unorm8 | SampleFormat::Unorm8x4 => f64::from(bytes[0]) / 255.0,
             SampleFormat::Unorm16 => f64::from(u16::from_le_bytes([bytes[0], bytes[1]])) / 65535.0,
             SampleFormat::Float32 => f64::from(f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])),
         }
@@ -141,6 +141,7 @@ impl TextureWork {
         let noise = (i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as u32; // 24 bits
         let bytes = match self.format {
             SampleFormat::Unorm8 => noise >> 16,
+            SampleFormat::Unorm8x4 => noise,
             SampleFormat::Unorm16 => noise >> 8,
             SampleFormat::Float32 => (noise as f32 / (1 << 24) as f32).to_bits(),
         };

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use crate::{Chunked, FramePlan, KnotUniform, Slots};
+use crate::{Chunked, FramePlan, KnotUniform, LightUniform, Slots};
 
 /// A buffer, texture or sampler, by the name that it has in shaders (`frame.wesl`).
 ///
@@ -29,8 +29,14 @@ pub enum Resource {
     OneSpreads,
     /// For each flat block, its least and its greatest voxel.
     Ranges,
+    /// The gradients of flat blocks' samples, each at its sample's texel, a 3-D texture.
+    Gradients,
+    /// For each flat block that is one sample, its gradient.
+    OneGradients,
     /// The transfer function's knots.
     Knots,
+    /// The light on surfaces ([`LightUniform`]).
+    Light,
     /// The picture that rays are stored to.
     Picture,
     /// The inputs of an evaluated function.
@@ -65,7 +71,7 @@ pub enum Content<'a> {
 
 impl Resource {
     /// All resources.
-    pub const ALL: [Resource; 20] = [
+    pub const ALL: [Resource; 23] = [
         Resource::Frame,
         Resource::Atlas,
         Resource::AtlasSampler,
@@ -75,7 +81,10 @@ impl Resource {
         Resource::Spreads,
         Resource::OneSpreads,
         Resource::Ranges,
+        Resource::Gradients,
+        Resource::OneGradients,
         Resource::Knots,
+        Resource::Light,
         Resource::Picture,
         Resource::Inputs,
         Resource::Outputs,
@@ -100,7 +109,10 @@ impl Resource {
             Resource::Spreads => "spreads",
             Resource::OneSpreads => "one_spreads",
             Resource::Ranges => "ranges",
+            Resource::Gradients => "gradients",
+            Resource::OneGradients => "one_gradients",
             Resource::Knots => "knots",
+            Resource::Light => "light",
             Resource::Picture => "picture",
             Resource::Inputs => "inputs",
             Resource::Outputs => "outputs",
@@ -133,7 +145,10 @@ impl FramePlan {
             Resource::Spreads => self.spreads().map(|slots| Content::Texture(slots)),
             Resource::OneSpreads => self.spreads().and_then(|slots| slots.one_table()).map(Content::Chunks),
             Resource::Ranges => self.spreads().and(self.field.ranges()).map(|ranges| Content::Chunks(ranges.table())),
+            Resource::Gradients => self.gradients().map(|slots| Content::Texture(slots)),
+            Resource::OneGradients => self.gradients().and_then(|slots| slots.one_table()).map(Content::Chunks),
             Resource::Knots => bytes(bytemuck::cast_slice(&KnotUniform::of(self))),
+            Resource::Light => LightUniform::of(self).and_then(|light| bytes(bytemuck::bytes_of(&light))),
             Resource::Occupancy => self.occupancy.as_ref().map(|occupancy| Content::Chunks(&**occupancy)),
             Resource::Beams => self.beams.as_ref().and_then(|beams| bytes(bytemuck::cast_slice(&beams.spans()))),
             Resource::Drawn => {

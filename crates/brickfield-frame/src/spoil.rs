@@ -6,8 +6,8 @@ use brickfield_core::glam::UVec3;
 use brickfield_core::{Aabb, Companion, TransferFunction};
 
 use crate::{
-    Beams, BlockRanges, Feature, FeatureSet, Field, FramePlan, IndexGrid, Join, Occupancy, Overview, ProxyGeometry,
-    RayFrame, Sampling, Slots,
+    Beams, BlockRanges, Feature, FeatureSet, Field, FramePlan, IndexGrid, Join, Lighting, Occupancy, Overview,
+    ProxyGeometry, RayFrame, Sampling, Slots,
 };
 
 /// A plan taken apart. It is put together again without validation: the plan may be wrong in any way.
@@ -25,6 +25,7 @@ pub struct SpoiltPlan {
     pub visible: Aabb,
     pub sampling: Sampling,
     pub transfer: TransferFunction,
+    pub lighting: Option<Lighting>,
     pub occupancy: Option<Arc<Occupancy>>,
     pub proxy: Option<Arc<ProxyGeometry>>,
     pub features: FeatureSet,
@@ -34,7 +35,7 @@ pub struct SpoiltPlan {
 impl SpoiltPlan {
     /// The parts of a plan.
     pub fn of(plan: &FramePlan) -> SpoiltPlan {
-        let FramePlan { field, rays, domain, visible, sampling, transfer, occupancy, beams, proxy, features } =
+        let FramePlan { field, rays, domain, visible, sampling, transfer, lighting, occupancy, beams, proxy, features } =
             plan.clone();
         SpoiltPlan {
             dims: field.dims(),
@@ -48,6 +49,7 @@ impl SpoiltPlan {
             visible,
             sampling,
             transfer,
+            lighting,
             occupancy,
             proxy,
             features,
@@ -64,10 +66,21 @@ impl SpoiltPlan {
     /// The plan as it is now. Beams are traced anew: an error shall be seen, not hidden by beams that know better.
     pub fn into_plan(self) -> FramePlan {
         let field = self.field();
-        let SpoiltPlan { rays, domain, visible, sampling, transfer, occupancy, proxy, features, .. } = self;
+        let SpoiltPlan { rays, domain, visible, sampling, transfer, lighting, occupancy, proxy, features, .. } = self;
         let features = features.without(Feature::SkipBesideBeams);
-        let mut plan =
-            FramePlan { field, rays, domain, visible, sampling, transfer, occupancy, beams: None, proxy, features };
+        let mut plan = FramePlan {
+            field,
+            rays,
+            domain,
+            visible,
+            sampling,
+            transfer,
+            lighting,
+            occupancy,
+            beams: None,
+            proxy,
+            features,
+        };
         if let (true, Some(side)) = (self.has_beams, plan.field.slots().brick_side()) {
             let overview = Overview::of(side, plan.field.index(), plan.occupancy.as_deref());
             plan.beams = overview.and_then(|overview| Beams::of(&plan, &overview)).map(Arc::new);

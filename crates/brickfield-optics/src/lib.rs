@@ -4,6 +4,7 @@ mod automatic;
 #[cfg(feature = "color")]
 mod difference;
 mod histogram;
+mod light;
 mod narrow_peak;
 mod opacity;
 mod prefiltered;
@@ -18,6 +19,7 @@ mod transfer_file;
 pub use automatic::{automatic, diagonal_world};
 #[cfg(feature = "color")]
 pub use difference::{ColorDifferences, ColorMetric, PixelCountError, cie_luv};
+pub use light::{Light, LightError, LightSource, LightTerms, LitSides, Normals, Shade, flat_below};
 pub use narrow_peak::{NarrowPeak, narrow_peak};
 pub use opacity::{OPAQUE_DEPTH, alpha, depth, rescale_alpha, transmittance};
 pub use prefiltered::{ValueSpread, expected_optics};

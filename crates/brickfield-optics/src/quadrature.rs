@@ -6,7 +6,7 @@
 
 use brickfield_core::{LinearRgb, Optics, TransferFunction};
 
-use crate::{alpha, depth, transmittance};
+use crate::{Shade, alpha, depth, transmittance};
 
 /// How a segment of a ray is integrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -96,12 +96,31 @@ impl QuadratureRule {
     /// # Panics
     /// If there are fewer values than nodes.
     pub fn segment(self, transfer: &TransferFunction, values: &[f64], length_world: f64) -> Segment {
-        self.classified(|node| transfer.at(values[node]), length_world)
-            .unwrap_or_else(|| preintegrate(transfer, values[0], values[1], length_world))
+        let node = |i: usize| (values[i], Shade::NONE);
+        match self.nodes().len() {
+            1 => self.lit_segment(transfer, &[node(0)], length_world),
+            _ => self.lit_segment(transfer, &[node(0), node(1)], length_world),
+        }
     }
 
-    /// A segment of length `length_world` whose nodes have these optics (one per node); `None` of [`PreIntegrated`](Self::PreIntegrated),
-    /// which looks at the values between its nodes.
+    /// A segment of length `length_world` whose nodes have these data values and shades (one of each per node).
+    ///
+    /// A node's shade is on its colour. With [`PreIntegrated`](Self::PreIntegrated), which looks at values between the nodes, the nodes'
+    /// mean shade is on all of the segment's emission.
+    ///
+    /// # Panics
+    /// If there are fewer than nodes.
+    pub fn lit_segment(self, transfer: &TransferFunction, nodes: &[(f64, Shade)], length_world: f64) -> Segment {
+        let optics = |i: usize| nodes[i].1.on(transfer.at(nodes[i].0));
+        self.classified(optics, length_world).unwrap_or_else(|| {
+            let Segment { depth, emission } = preintegrate(transfer, nodes[0].0, nodes[1].0, length_world);
+            let Shade { factor, highlight } = nodes[0].1.mean(nodes[1].1);
+            Segment { depth, emission: emission.map(|e| e * factor + alpha(depth) * highlight) }
+        })
+    }
+
+    /// A segment of length `length_world` whose nodes have these optics (one per node), with their shades on them; `None` of
+    /// [`PreIntegrated`](Self::PreIntegrated), which looks at the values between its nodes.
     ///
     /// # Panics
     /// If there are fewer optics than nodes.

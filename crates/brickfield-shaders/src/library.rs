@@ -27,7 +27,7 @@ const fn one_of(path: &'static str, name: &'static str, text: &'static str) -> M
     Module { name, path, text: Cow::Borrowed(text) }
 }
 
-const EMBEDDED: [Module; 23] = [
+const EMBEDDED: [Module; 26] = [
     own("frame", include_str!("wesl/frame.wesl")),
     own("scalar", include_str!("wesl/scalar.wesl")),
     own("transfer", include_str!("wesl/transfer.wesl")),
@@ -39,6 +39,9 @@ const EMBEDDED: [Module; 23] = [
     one_of("field", "field/blocks", include_str!("wesl/field/blocks.wesl")),
     one_of("field", "field/dense", include_str!("wesl/field/dense.wesl")),
     own("interblock", include_str!("wesl/interblock.wesl")),
+    one_of("gradient", "gradient/central", include_str!("wesl/gradient/central.wesl")),
+    one_of("gradient", "gradient/stored", include_str!("wesl/gradient/stored.wesl")),
+    own("light", include_str!("wesl/light.wesl")),
     own("quadrature", include_str!("wesl/quadrature.wesl")),
     own("preintegrated", include_str!("wesl/preintegrated.wesl")),
     own("prefiltered", include_str!("wesl/prefiltered.wesl")),

@@ -1,6 +1,6 @@
 //! How a frame is cut into dispatches: none takes long, no loop goes round too often, no sum grows too long.
 
-use brickfield_frame::{Division, FramePlan, Pass, QuadratureRule};
+use brickfield_frame::{Division, FramePlan, Join, Pass, QuadratureRule};
 
 use crate::KnotSearch;
 
@@ -9,8 +9,8 @@ use crate::KnotSearch;
 const MOST_ROUNDS: f64 = 65_535.0;
 /// Most segments that are added up one by one: the rounding errors of longer sums would show.
 const MOST_SEGMENTS: f64 = 8192.0;
-/// Most nodes in one dispatch: about a second on a slow device, whose driver may end a longer dispatch.
-const MOST_NODES: f64 = (1u32 << 28) as f64;
+/// Most values of the field in one dispatch: about a second on a slow device, whose driver may end a longer dispatch.
+const MOST_VALUES: f64 = (1u32 << 28) as f64;
 
 /// The dispatches of a plan's frame, in order; rows are cut at multiples of `group_height`.
 pub fn passes(plan: &FramePlan, group_height: u32) -> Vec<Pass> {
@@ -59,7 +59,8 @@ fn rounds_of_bricks(plan: &FramePlan) -> f64 {
 }
 
 /// How often the loops of the march go round for a segment, at most: once each to find its block, to enter it and to
-/// integrate; for each piece between knots; and for each halving of a search that is a loop.
+/// integrate; for each piece between knots; for each halving of a search that is a loop; for each block of a blended value; and for
+/// each bit of a light's shininess.
 fn rounds_per_segment(plan: &FramePlan) -> f64 {
     let rule = plan.sampling().rule();
     let n_knots = plan.transfer().knots().len() as f64;
@@ -74,14 +75,27 @@ fn rounds_per_segment(plan: &FramePlan) -> f64 {
         KnotSearch::Unrolled(_) => 0.0,
         KnotSearch::Loop => (n_knots.log2() + 1.0).floor() * n_nodes,
     };
-    3.0 + pieces + search
+    let blocks = if plan.field().dense_level().is_none() && plan.field().join() != Join::Shared { 8.0 } else { 0.0 };
+    let bits = plan.lighting().map_or(0, |l| u32::BITS - l.light.terms().shininess.leading_zeros());
+    let nodes = rule.nodes().len() as f64 * (blocks * values_per_node(plan) + f64::from(bits));
+    3.0 + pieces + search + nodes
+}
+
+/// Values of the field that a node asks for: with light, six more for its gradient, or the stored one.
+fn values_per_node(plan: &FramePlan) -> f64 {
+    match (plan.lighting(), plan.gradients()) {
+        (None, _) => 1.0,
+        (_, Some(_)) => 2.0,
+        (_, None) => 7.0,
+    }
 }
 
 fn rows_per_pass(plan: &FramePlan, group_height: u32) -> u32 {
     let voxels_per_segment =
         plan.rays().direction[0].length() * plan.sampling().step_world() * plan.rays().least_stretch();
     let n_segments = (plan.visible().diagonal() / voxels_per_segment).clamp(1.0, segments_per_pass(plan));
-    let nodes_per_row = n_segments * plan.sampling().rule().nodes().len() as f64 * f64::from(plan.size().x);
+    let n_nodes = n_segments * plan.sampling().rule().nodes().len() as f64 * f64::from(plan.size().x);
+    let values_per_row = n_nodes * values_per_node(plan);
     // A float that is too large becomes the largest integer.
-    ((MOST_NODES / nodes_per_row) as u32 / group_height).max(1).saturating_mul(group_height)
+    ((MOST_VALUES / values_per_row) as u32 / group_height).max(1).saturating_mul(group_height)
 }

@@ -3,6 +3,7 @@
 use brickfield_core::Interblock;
 use brickfield_frame::{
     Division, Feature, FeatureSet, Fetch, FramePlan, Join, Lengths, Placement, Places, QuadratureRule, ShaderFunction,
+    Slices,
 };
 
 use crate::passes::has_long_rays;
@@ -152,7 +153,8 @@ impl Surfaces {
 }
 
 /// The features for which a ray asks the field.
-const READS_FIELD: [Feature; 3] = [Feature::TransferLookup, Feature::SkipEmpty, Feature::SkipMacrocells];
+const READS_FIELD: [Feature; 4] =
+    [Feature::TransferLookup, Feature::SkipEmpty, Feature::SkipMacrocells, Feature::Light];
 
 /// How the knots of a transfer function are searched.
 ///
@@ -201,7 +203,7 @@ pub enum Entry {
     /// Renders the picture by casting rays.
     March,
     /// Renders the picture by shading the polygons of proxy geometry: a vertex and a fragment shader.
-    Proxy,
+    Proxy(Slices),
     /// Evaluates one function on a list of inputs.
     Evaluate(ShaderFunction),
     /// Reads textures and does nothing else, to be timed ([`brickfield_frame::Probe`]).
@@ -212,14 +214,17 @@ impl Entry {
     /// All kinds of entries, the last two for each function and each fetch.
     pub fn all() -> impl Iterator<Item = Entry> {
         let functions = ShaderFunction::ALL.into_iter().map(Entry::Evaluate);
-        [Entry::March, Entry::Proxy].into_iter().chain(functions).chain(Fetch::ALL.map(Entry::Probe))
+        [Entry::March, Entry::Proxy(Slices::Together), Entry::Proxy(Slices::InteriorsFirst)]
+            .into_iter()
+            .chain(functions)
+            .chain(Fetch::ALL.map(Entry::Probe))
     }
 
     /// The names of the entry points: one for compute, or one for vertices and one for fragments.
     pub const fn entry_points(self) -> &'static [&'static str] {
         match self {
             Entry::March => &["march"],
-            Entry::Proxy => &["project", "shade"],
+            Entry::Proxy(_) => &["project", "shade"],
             Entry::Evaluate(_) => &["evaluate"],
             Entry::Probe(Fetch::Filtered) => &["filtered"],
             Entry::Probe(Fetch::Loaded) => &["loaded"],
@@ -230,7 +235,7 @@ impl Entry {
     pub(crate) const fn module(self) -> &'static str {
         match self {
             Entry::March => "march",
-            Entry::Proxy => "proxy",
+            Entry::Proxy(_) => "proxy",
             Entry::Evaluate(_) => "evaluate",
             Entry::Probe(_) => "probe",
         }
@@ -267,13 +272,17 @@ impl Variant {
     }
 
     /// The modules that are compiled, one for each path that several modules share.
-    pub(crate) fn chosen_modules(self) -> [&'static str; 2] {
+    pub(crate) fn chosen_modules(self) -> [&'static str; 3] {
         let integrate = match self.segments.division {
             Division::Brick => "integrate/bricks",
             Division::Ray if self.reads_field() => "integrate/rays",
             Division::Ray => "integrate/constant",
         };
-        [self.field.module(), integrate]
+        let gradient = match self.features.contains(Feature::StoredGradients) {
+            true => "gradient/stored",
+            false => "gradient/central",
+        };
+        [self.field.module(), integrate, gradient]
     }
 
     fn reads_field(self) -> bool {
@@ -308,6 +317,9 @@ impl Variant {
             ("lattice_origin", self.field != FieldKind::Bricks),
             ("wide_blocks", has(Feature::MultiLevel) || has(Feature::SkipEmpty) || self.field != FieldKind::Bricks),
             ("blend", self.field.scheme().is_some()),
+            ("interiors_first", self.entry == Entry::Proxy(Slices::InteriorsFirst)),
+            ("dense", self.field == FieldKind::Dense),
+            ("flat_blocks", matches!(self.field, FieldKind::Blocks(_) | FieldKind::Dense)),
             ("long_rays", self.long_rays),
             ("integer_samples", self.integer_samples),
         ];

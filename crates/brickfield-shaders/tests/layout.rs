@@ -2,7 +2,9 @@
 
 use std::mem::{offset_of, size_of};
 
-use brickfield_frame::{FeatureSet, Fetch, FrameUniforms, KnotUniform, PlaceUniform, ProbeUniforms, QuadratureRule};
+use brickfield_frame::{
+    Feature, FeatureSet, Fetch, FrameUniforms, KnotUniform, LightUniform, PlaceUniform, ProbeUniforms, QuadratureRule,
+};
 use brickfield_shaders::naga::{Module, TypeInner};
 use brickfield_shaders::{Entry, FieldKind, Variant, specialise};
 
@@ -30,7 +32,7 @@ fn assert_equal(module: &Module, name: &str, (members, size): (Vec<(&str, usize)
 #[test]
 fn host_and_shader_structs_have_the_same_layout() {
     let mut variant = Variant::new(FeatureSet::all(), QuadratureRule::MidpointExponential, Entry::March);
-    variant.features = variant.features.without(brickfield_frame::Feature::SkipMacrocells);
+    variant.features = variant.features.without(Feature::SkipMacrocells).without(Feature::StoredGradients);
     variant.field = FieldKind::Placed;
     let module = specialise(&variant).unwrap().module;
     #[rustfmt::skip]
@@ -39,6 +41,9 @@ fn host_and_shader_structs_have_the_same_layout() {
         index_dims, atlas_bricks, planes_low, planes_high, voxel_world, size, facets_of_picture = facet_pixels));
     assert_rows();
     assert_equal(&module, "Knot", host!(KnotUniform, optics, value, per_value, padding));
+    #[rustfmt::skip]
+    assert_equal(&module, "Light", host!(LightUniform, steepness_x, steepness_y, steepness_z, world_x, world_y, world_z, source,
+        ambient, diffuse, specular, shininess, greatest_slope, back));
     assert_equal(&module, "Place", host!(PlaceUniform, texel, level, first, padding, last, axes));
     for fetch in Fetch::ALL {
         assert_equal(&specialise(&Variant::probe(fetch)).unwrap().module, "Probe", host!(ProbeUniforms, work));

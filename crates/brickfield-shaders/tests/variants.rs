@@ -3,7 +3,9 @@
 use std::collections::HashSet;
 
 use brickfield_core::Interblock;
-use brickfield_frame::{Division, Feature, FeatureSet, Fetch, Join, Lengths, QuadratureRule, Resource, ShaderFunction};
+use brickfield_frame::{
+    Division, Feature, FeatureSet, Fetch, Join, Lengths, QuadratureRule, Resource, ShaderFunction, Slices,
+};
 use brickfield_shaders::{
     BindingKind, Entry, FieldKind, KnotSearch, Segments, ShaderError, ShaderLibrary, Specialised, Surfaces, Variant,
     specialise,
@@ -15,6 +17,10 @@ fn compile(variant: &Variant) -> Specialised {
 
 fn march(features: FeatureSet, rule: QuadratureRule) -> Specialised {
     compile(&Variant::new(features, rule, Entry::March))
+}
+
+fn unlit(features: FeatureSet) -> FeatureSet {
+    features.without(Feature::Light).without(Feature::LightBesideEye).without(Feature::StoredGradients)
 }
 
 fn resources(shader: &Specialised) -> Vec<Resource> {
@@ -48,13 +54,19 @@ fn variant(options: &[usize; N_OPTIONS]) -> Option<Variant> {
     let Segments { surfaces, division, lengths } = variant.segments;
     let is_nominal = lengths == Lengths::Nominal;
     let is_drawn = surfaces != Surfaces::Shells && division == Division::Brick && !variant.long_rays;
+    let is_blended = matches!(variant.field, FieldKind::Blocks(Join::Blend(_)));
     let is_of_blocks = matches!(variant.field, FieldKind::Blocks(_) | FieldKind::Dense);
     let is_asked_for = (!is_nominal || variant.rule == QuadratureRule::MidpointExponential)
-        && (variant.entry != Entry::Proxy || is_drawn)
+        && (!matches!(variant.entry, Entry::Proxy(_)) || is_drawn)
+        && (variant.entry != Entry::Proxy(Slices::InteriorsFirst) || is_blended)
         && (variant.field == FieldKind::Bricks || !features.contains(Feature::SkipMacrocells))
         && (is_of_blocks || !features.contains(Feature::ShortBlocks))
         && (matches!(variant.field, FieldKind::Blocks(_)) || !features.contains(Feature::Prefiltered))
-        && (variant.rule != QuadratureRule::PreIntegrated || !features.contains(Feature::Prefiltered));
+        && (variant.rule != QuadratureRule::PreIntegrated || !features.contains(Feature::Prefiltered))
+        && (features.contains(Feature::TransferLookup) || !features.contains(Feature::Light))
+        && (features.contains(Feature::Light) || !features.contains(Feature::LightBesideEye))
+        && (features.contains(Feature::Light) && matches!(variant.field, FieldKind::Blocks(_) | FieldKind::Dense)
+            || !features.contains(Feature::StoredGradients));
     is_asked_for.then_some(variant)
 }
 
@@ -96,6 +108,12 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
         let shader = compile(&variant);
         assert!(shader.spirv().unwrap().len() > 100);
         let uses = |resource| shader.uses(resource);
+        let is_lit = variant.features.contains(Feature::Light);
+        let draws = matches!(variant.entry, Entry::March | Entry::Proxy(_));
+        assert_eq!(uses(Resource::Light), is_lit && draws);
+        let is_stored = variant.features.contains(Feature::StoredGradients);
+        assert_eq!(uses(Resource::Gradients), is_stored && draws);
+        assert_eq!(uses(Resource::OneGradients), is_stored && draws && variant.field != FieldKind::Dense);
         match variant.entry {
             Entry::March => {
                 assert_eq!(shader.workgroup_size, [8, 8, 1]);
@@ -111,10 +129,12 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
                 let of_spreads = [Resource::Spreads, Resource::OneSpreads, Resource::Ranges];
                 assert!(of_spreads.into_iter().all(|resource| uses(resource) == is_prefiltered));
             }
-            Entry::Proxy => {
+            Entry::Proxy(_) => {
                 assert_eq!(shader.module.entry_points.len(), 2);
-                let of_rays = [Resource::Index, Resource::Picture, Resource::SeenBefore, Resource::Beams];
+                let of_rays = [Resource::Picture, Resource::SeenBefore, Resource::Beams];
                 assert!(!of_rays.into_iter().any(uses), "{:?}", resources(&shader));
+                // A gradient may ask the next brick.
+                assert!(!uses(Resource::Index) || variant.features.contains(Feature::Light));
             }
             Entry::Probe(_) => assert!(uses(Resource::Means)),
             Entry::Evaluate(_) => {
@@ -128,7 +148,8 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
 
 #[test]
 fn a_device_with_few_storage_buffers_gets_a_shader_without_shortcuts() {
-    let mut general = Variant::new(FeatureSet::all(), QuadratureRule::MidpointExponential, Entry::March);
+    let unlit = unlit(FeatureSet::all());
+    let mut general = Variant::new(unlit, QuadratureRule::MidpointExponential, Entry::March);
     general.long_rays = true;
     general.segments.surfaces = Surfaces::TessellatedShells;
     let library = ShaderLibrary::embedded();
@@ -159,13 +180,16 @@ fn every_search_compiles_and_only_the_last_loops() {
 #[test]
 fn what_a_scene_does_not_need_is_left_out() {
     let rule = QuadratureRule::MidpointExponential;
-    let all = FeatureSet::all();
-    use Resource::{Atlas, AtlasSampler, Beams, Frame, Index, Knots, Occupancy, Picture};
-    assert_eq!(resources(&march(all, rule)), [Frame, Atlas, AtlasSampler, Index, Knots, Picture, Occupancy, Beams]);
+    // Bricks have no stored gradients.
+    let all = FeatureSet::all().without(Feature::StoredGradients);
+    use Resource::{Atlas, AtlasSampler, Beams, Frame, Index, Knots, Light, Occupancy, Picture};
+    let of_general = [Frame, Atlas, AtlasSampler, Index, Knots, Picture, Occupancy, Beams, Light];
+    assert_eq!(resources(&march(all, rule)), of_general);
     for (feature, resource) in [
         (Feature::HardwareFilter, AtlasSampler),
         (Feature::SkipMacrocells, Occupancy),
         (Feature::SkipBesideBeams, Beams),
+        (Feature::Light, Light),
     ] {
         assert!(!march(all.without(feature), rule).uses(resource), "{}", resource.name());
     }
@@ -174,17 +198,20 @@ fn what_a_scene_does_not_need_is_left_out() {
     assert_eq!(resources(&skipping), [Frame, Index, Knots, Picture]);
 
     let general = march(all, rule);
+    // Light looks values up.
+    let unlit = unlit(all);
     let of_blocks = |features| {
         let mut variant = Variant::new(features, rule, Entry::March);
         variant.field = FieldKind::Blocks(Join::Blend(Interblock::MaximumDistance));
         compile(&variant)
     };
-    for feature in Feature::ALL.into_iter().filter(|f| *f != Feature::HardwareFilter) {
+    for feature in all.iter().filter(|f| *f != Feature::HardwareFilter) {
         let (with, without) = match feature {
             Feature::ShortBlocks | Feature::Prefiltered => {
                 let features = all.without(Feature::SkipMacrocells);
                 (of_blocks(features), of_blocks(features.without(feature)))
             }
+            Feature::TransferLookup => (march(unlit, rule), march(unlit.without(feature), rule)),
             _ => (general.clone(), march(all.without(feature), rule)),
         };
         assert!(without.counts.expressions < with.counts.expressions, "{}", feature.name());
@@ -199,10 +226,14 @@ fn what_a_scene_does_not_need_is_left_out() {
         ("fn dark_around", Feature::SkipMacrocells),
         ("let beam", Feature::SkipBesideBeams),
         ("    scale: f32", Feature::MultiLevel),
-        ("fn knot_below", Feature::TransferLookup),
+        ("fn shade_at", Feature::Light),
+        ("fn gradient_at", Feature::Light),
+        ("fn towards_light", Feature::LightBesideEye),
     ] {
         assert!(general.wgsl.contains(text) && !march(all.without(feature), rule).wgsl.contains(text), "{text}");
     }
+    assert!(march(unlit, rule).wgsl.contains("fn knot_below"));
+    assert!(!march(unlit.without(Feature::TransferLookup), rule).wgsl.contains("fn knot_below"));
     assert!(!general.wgsl.contains("textureLoad") && !general.wgsl.contains("preintegrate"));
 }
 

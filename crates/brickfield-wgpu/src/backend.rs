@@ -146,10 +146,11 @@ impl Backend for WgpuBackend {
         self.check_blending(plan)?;
         let started = Instant::now();
         let maker = plan.proxy().map_or(Maker::Rays, |proxy| Maker::Polygons(proxy.target()));
-        let pipeline = match maker {
-            Maker::Rays => self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?,
-            Maker::Polygons(target) => {
-                self.pipelines.blending_into(&self.device, Variant::of(plan, Entry::Proxy), target)?
+        let pipeline = match plan.proxy() {
+            None => self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?,
+            Some(proxy) => {
+                let variant = Variant::of(plan, Entry::Proxy(proxy.slices()));
+                self.pipelines.blending_into(&self.device, variant, proxy.target())?
             }
         };
         let Brought { uniforms, mut n_bytes } = self.resources.bring(&self.device, plan, pipeline)?;

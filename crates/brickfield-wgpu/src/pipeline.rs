@@ -87,7 +87,7 @@ fn from_shader(device: &wgpu::Device, shader: Specialised, target: Target) -> Pi
         source: wgpu::ShaderSource::Naga(Cow::Owned(shader.module)),
     });
     let program = match entry {
-        Entry::Proxy => Program::Polygons(polygons(device, &pipeline_layout, &module, target)),
+        Entry::Proxy(_) => Program::Polygons(polygons(device, &pipeline_layout, &module, (entry, target))),
         Entry::March | Entry::Evaluate(_) | Entry::Probe(_) => {
             Program::Compute(compute(device, &pipeline_layout, &module, label))
         }
@@ -115,9 +115,9 @@ fn polygons(
     device: &wgpu::Device,
     layout: &wgpu::PipelineLayout,
     module: &wgpu::ShaderModule,
-    target: Target,
+    (entry, target): (Entry, Target),
 ) -> wgpu::RenderPipeline {
-    let [vertex, fragment] = [0, 1].map(|i| Some(Entry::Proxy.entry_points()[i]));
+    let [vertex, fragment] = [0, 1].map(|i| Some(entry.entry_points()[i]));
     let compilation_options = wgpu::PipelineCompilationOptions::default;
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some("polygons"),
@@ -170,7 +170,7 @@ fn layout_entry(binding: &Binding, entry: Entry, filtered: bool) -> wgpu::BindGr
         },
     };
     let visibility = match entry {
-        Entry::Proxy => wgpu::ShaderStages::VERTEX_FRAGMENT,
+        Entry::Proxy(_) => wgpu::ShaderStages::VERTEX_FRAGMENT,
         Entry::March | Entry::Evaluate(_) | Entry::Probe(_) => wgpu::ShaderStages::COMPUTE,
     };
     wgpu::BindGroupLayoutEntry { binding: binding.index, visibility, ty, count: None }

@@ -1,7 +1,6 @@
 //! The samples of slots in a 3-D texture.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 use brickfield_core::glam::UVec3;
 use brickfield_frame::{
@@ -104,57 +103,37 @@ impl Texture {
 
     /// Writes the slots that are not there.
     fn upload(&mut self, device: &Device, slots: &Slots) -> Result<u64, RenderError> {
-        let missing: Vec<u32> = self.held.missing(slots).into_iter().flatten().map(|slot| slot as u32).collect();
-        if missing.is_empty() {
-            self.held.hold(slots);
-            return Ok(0);
-        }
-        let mut n_bytes = 0;
-        device.checked("the atlas's samples", 0, || {
-            n_bytes = match self.shape {
-                TextureShape::Atlas(shape) => self.write_bricks(device, slots, shape, &missing),
-                TextureShape::Table(_) => missing.iter().map(|slot| self.write_slot(device, slots, *slot)).sum(),
-            };
-            device.queue.submit([]);
-        })?;
-        self.held.hold(slots);
-        Ok(n_bytes)
-    }
-
-    /// Writes bricks one by one, or a layer at once if most of it is missing and nothing is held: of a slot without samples the
-    /// device may still hold the last ones.
-    fn write_bricks(&self, device: &Device, slots: &Slots, shape: AtlasShape, missing: &[u32]) -> u64 {
-        let per_layer = shape.bricks.x * shape.bricks.y;
-        let (mut n_bytes, mut waiting) = (0, 0);
-        for layer in missing.chunk_by(|a, b| a / per_layer == b / per_layer) {
-            let z = layer[0] / per_layer;
-            let is_new = !(z * per_layer..(z + 1) * per_layer).any(|slot| self.held.has_any(slot as usize));
-            let written = match is_new && 2 * layer.len() as u32 > per_layer {
-                true => self.write_layer(device, slots, shape, z),
-                false => layer.iter().map(|slot| self.write_slot(device, slots, *slot)).sum(),
-            };
-            (n_bytes, waiting) = (n_bytes + written, waiting + written as usize);
-            if waiting >= BYTES_AT_ONCE {
+        let missing = self.held.missing(slots).into_iter().flatten().map(|slot| slot as u32);
+        let mut boxes: Vec<TexelBox> = missing.filter_map(|slot| TexelBox::of(self.shape, slots, slot)).collect();
+        boxes.sort_by_key(|b| (b.origin.z, b.origin.y, b.origin.x));
+        let mut rows = boxes.chunk_by(TexelBox::goes_on_with).peekable();
+        while rows.peek().is_some() {
+            device.checked("the atlas's samples", 0, || {
+                let mut waiting = 0;
+                while let Some(row) = rows.next_if(|_| waiting < BYTES_AT_ONCE) {
+                    waiting += self.write_row(device, row);
+                }
                 device.queue.submit([]);
-                waiting = 0;
+            })?;
+            // What was handed over is freed only then.
+            if rows.peek().is_some() {
+                device.wait("uploading samples")?;
             }
         }
-        n_bytes
+        self.held.hold(slots);
+        Ok(boxes.iter().map(|b| b.samples.len() as u64).sum())
     }
 
-    fn write_slot(&self, device: &Device, slots: &Slots, slot: u32) -> u64 {
-        let Some(samples) = slots.samples(slot) else { return 0 };
-        let (origin, size) = self.shape.texels_of(slots, slot);
-        self.write(device, samples.bytes(), origin, size);
-        samples.bytes().len() as u64
-    }
-
-    /// Writes the bricks at height `layer` of the atlas.
-    fn write_layer(&self, device: &Device, slots: &Slots, shape: AtlasShape, layer: u32) -> u64 {
-        let (texels, side) = (shape.texels(), shape.side.n_samples());
-        let bytes = layer_bytes(slots, shape, layer);
-        self.write(device, &bytes, UVec3::new(0, 0, layer * side), UVec3::new(texels.x, texels.y, side));
-        bytes.len() as u64
+    /// Writes boxes side by side at once, for the driver aligns each row of texels; returns the bytes that this takes on the way.
+    fn write_row(&self, device: &Device, boxes: &[TexelBox]) -> usize {
+        let (first, sample) = (boxes[0], self.format.n_bytes());
+        let size = first.size.with_x(boxes.iter().map(|b| b.size.x).sum());
+        match boxes {
+            [one] => self.write(device, one.samples, first.origin, size),
+            _ => self.write(device, &side_by_side(boxes, sample), first.origin, size),
+        }
+        let row = (size.x as usize * sample).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as usize);
+        row * size.y as usize * size.z as usize
     }
 
     fn write(&self, device: &Device, bytes: &[u8], origin: UVec3, size: UVec3) {
@@ -175,27 +154,36 @@ fn extent(size: UVec3) -> wgpu::Extent3d {
     wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: size.z }
 }
 
-/// The slots of a layer of an atlas; fewer in the last layer, or none.
-fn slots_of_layer(slots: &Slots, shape: AtlasShape, layer: u32) -> Range<u32> {
-    let per_layer = shape.bricks.x * shape.bricks.y;
-    layer * per_layer..slots.n_slots().min((layer + 1) * per_layer)
+/// The samples of a slot, and the texels where they belong.
+#[derive(Clone, Copy)]
+struct TexelBox<'a> {
+    origin: UVec3,
+    size: UVec3,
+    samples: &'a [u8],
 }
 
-/// The texels of a layer of bricks, x fastest; where there is no brick they are 0.
-fn layer_bytes(slots: &Slots, shape: AtlasShape, layer: u32) -> Vec<u8> {
-    let (texels, side) = (shape.texels(), shape.side.n_samples() as usize);
-    let sample = slots.format().n_bytes();
-    let (row, image) = (texels.x as usize * sample, texels.x as usize * texels.y as usize * sample);
-    let mut bytes = vec![0; image * side];
-    for slot in slots_of_layer(slots, shape, layer) {
-        let Some(samples) = slots.samples(slot) else { continue };
-        let origin = shape.origin(slot);
-        let corner = origin.x as usize * sample + origin.y as usize * row;
-        for (i, from) in samples.bytes().chunks_exact(side * sample).enumerate() {
-            let to = corner + (i / side) * image + (i % side) * row;
-            bytes[to..to + from.len()].copy_from_slice(from);
-        }
+impl<'a> TexelBox<'a> {
+    fn of(shape: TextureShape, slots: &'a Slots, slot: u32) -> Option<TexelBox<'a>> {
+        let (origin, size) = shape.texels_of(slots, slot);
+        slots.samples(slot).map(|chunk| TexelBox { origin, size, samples: chunk.bytes() })
     }
+
+    /// Whether both are one box, this one first along x.
+    fn goes_on_with(&self, next: &TexelBox) -> bool {
+        self.origin.with_x(self.origin.x + self.size.x) == next.origin
+            && (self.size.y, self.size.z) == (next.size.y, next.size.z)
+    }
+}
+
+/// The samples of boxes side by side, of `sample` bytes each, x fastest.
+fn side_by_side(boxes: &[TexelBox], sample: usize) -> Vec<u8> {
+    let n_rows = boxes[0].size.y as usize * boxes[0].size.z as usize;
+    let row = |b: &TexelBox, i: usize| {
+        let n_bytes = b.size.x as usize * sample;
+        i * n_bytes..(i + 1) * n_bytes
+    };
+    let mut bytes = Vec::with_capacity(boxes.iter().map(|b| b.samples.len()).sum());
+    (0..n_rows).for_each(|i| boxes.iter().for_each(|b| bytes.extend_from_slice(&b.samples[row(b, i)])));
     bytes
 }
 
@@ -203,6 +191,7 @@ fn layer_bytes(slots: &Slots, shape: AtlasShape, layer: u32) -> Vec<u8> {
 pub(crate) fn stored_as(device: &Device, format: SampleFormat) -> Result<TextureFormat, RenderError> {
     match format {
         SampleFormat::Unorm8 => Ok(TextureFormat::R8Unorm),
+        SampleFormat::Unorm8x4 => Ok(TextureFormat::Rgba8Unorm),
         SampleFormat::Unorm16 if device.has(Features::TEXTURE_FORMAT_16BIT_NORM) => Ok(TextureFormat::R16Unorm),
         SampleFormat::Unorm16 => {
             Err(RenderError::Unsupported { what: "hold 16-bit samples in textures (TEXTURE_FORMAT_16BIT_NORM)" })
@@ -214,25 +203,17 @@ pub(crate) fn stored_as(device: &Device, format: SampleFormat) -> Result<Texture
 #[cfg(test)]
 mod tests {
     use super::*;
-    use brickfield_core::BrickSide;
-    use brickfield_frame::Decode;
 
     #[test]
-    fn layers_hold_every_brick_at_its_origin() {
-        let brick = |b: u8| (0..4096u32).map(move |i| (i % 251) as u8 ^ b);
-        let bytes: Vec<u8> = (0..5).flat_map(brick).collect();
-        let decode = Decode { scale: 255.0, offset: 0.0 };
-        let slots = Slots::even(BrickSide::S16, SampleFormat::Unorm8, decode, &bytes).unwrap();
-        let shape = slots.room(None, 64).unwrap().shape.atlas().unwrap();
-        let texels = shape.texels();
-        for slot in 0..5 {
-            let o = shape.origin(slot);
-            let layer = layer_bytes(&slots, shape, o.z / 16);
-            for (x, y, z) in [(0, 0, 0), (15, 0, 0), (3, 7, 11), (15, 15, 15)] {
-                let at = (o.x + x) + texels.x * (o.y + y + texels.y * z);
-                let expected = bytes[(slot * 4096 + x + 16 * (y + 16 * z)) as usize];
-                assert_eq!(layer[at as usize], expected);
-            }
-        }
+    fn boxes_side_by_side_are_one() {
+        let of = |x: u32, nx: u32, ny: u32, samples| TexelBox {
+            origin: UVec3::new(x, 4, 8),
+            size: UVec3::new(nx, ny, 1),
+            samples,
+        };
+        let boxes = [of(0, 2, 2, &[1, 2, 11, 12]), of(2, 1, 2, &[3, 13]), of(3, 1, 1, &[4]), of(5, 1, 1, &[5])];
+        let rows: Vec<usize> = boxes.chunk_by(TexelBox::goes_on_with).map(<[_]>::len).collect();
+        assert_eq!(rows, [2, 1, 1]);
+        assert_eq!(side_by_side(&boxes[..2], 1), [1, 2, 3, 11, 12, 13]);
     }
 }

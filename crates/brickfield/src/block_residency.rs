@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use brickfield_bricks::{BlockSource, FetchError, SourceId, greatest_spread};
+use brickfield_bricks::{BlockSource, FetchError, SourceId, greatest_gradient, greatest_spread};
 use brickfield_core::glam::UVec3;
 use brickfield_core::{BlockLayout, BlockSide, Companion, Level, ValueRange};
 use brickfield_frame::{
@@ -94,7 +94,8 @@ impl BlockResidency {
         let is_kept = |held: &Held| held.source == source.id() && held.dense_level() == dense.map(|(level, _)| level);
         let before = self.held.as_ref().filter(|held| is_kept(held));
         let is_new = |i: &usize| before.is_none_or(|held| held.rows[*i].level != levels[*i]);
-        let new: Vec<usize> = (0..levels.len()).filter(is_new).collect();
+        let mut new: Vec<usize> = (0..levels.len()).filter(is_new).collect();
+        new.sort_by_cached_key(|i| (levels[*i], along_cubes(source.layout().block(*i))));
         let coding = Coding::of(source);
         let fetched: Vec<Vec<u8>> =
             new.par_iter().map(|i| coding.fetch(source, *i, levels[*i])).collect::<Result<_, _>>()?;
@@ -320,6 +321,7 @@ impl HeldCompanions {
         }
         let (format, decode) = match companion {
             Companion::Spread => (SampleFormat::Unorm8, Decode { scale: greatest_spread(source), offset: 0.0 }),
+            Companion::Gradient => (SampleFormat::Unorm8x4, Decode { scale: greatest_gradient(source), offset: 0.0 }),
         };
         let slots = field.slots().companions(format, decode, self.chunks.clone(), self.ones.clone());
         let slots = slots.expect("companions fill the places of samples");
@@ -359,6 +361,12 @@ fn n_cubes(side: BlockSide, levels: impl Iterator<Item = Level>) -> u64 {
 fn cube_level(layout: &BlockLayout, ordinal: usize, level: Level) -> Level {
     let n = layout.n_samples(layout.block(ordinal), level).max_element().next_power_of_two();
     Level((layout.side().n_voxels() / n).trailing_zeros() as u8)
+}
+
+/// The place of a block on a curve that fills cube by cube: neighbours on it mostly come from one chunk of a source (Morton 1966).
+fn along_cubes(block: UVec3) -> u128 {
+    let bits = |axis: u32, n: u32| (0..32).map(move |bit| u128::from(n >> bit & 1) << (3 * bit + axis));
+    (0..3).flat_map(|axis| bits(axis, block[axis as usize])).sum()
 }
 
 /// How the samples of a source are held for a backend.

@@ -3,7 +3,8 @@
 use brickfield_bricks::{BlockSource, FetchError};
 use brickfield_core::glam::UVec3;
 use brickfield_core::{Aabb, BlockLayout, BlockSide, Companion, Level, Projection, TransferFunction, ValueRange};
-use brickfield_frame::{Drawing, FramePlan, IndexEntry, Join, PlanError, PlanParts, QuadratureRule};
+use brickfield_frame::{Drawing, FramePlan, IndexEntry, Join, Lighting, PlanError, PlanParts, QuadratureRule, Slices};
+use brickfield_optics::Normals;
 use rayon::prelude::*;
 
 use crate::course::{Course, segment_reach, to_sample_space};
@@ -17,6 +18,8 @@ pub struct BlockStyle {
     pub join: Join,
     /// What is drawn inside blocks that are transparent.
     pub transparent: TransparentBlocks,
+    /// The order of a polygon's fragments, where polygons are drawn.
+    pub slices: Slices,
     /// Which optics coarse samples have.
     pub classification: Classification,
 }
@@ -84,7 +87,7 @@ pub fn prepare_blocks(
     }
     let coarsest = levels.iter().copied().max().unwrap_or(Level(0));
     let Course { domain, sampling, rays } = Course::new(source.grid(), scene, coarsest)?;
-    residency.hold(source, levels, companions(scene, levels, style.classification))?;
+    residency.hold(source, levels, &companions(scene, levels, style.classification))?;
     let style = match scene.quality {
         Quality::Final => style,
         Quality::Draft => BlockStyle { join: Join::Shared, ..style },
@@ -93,21 +96,25 @@ pub fn prepare_blocks(
     let drawing = match scene.technique {
         Technique::RayCasting => Drawing::Rays,
         Technique::Polygons(target) => {
-            Drawing::Polygons { back_to_front: back_to_front(source, scene, &drawn), target }
+            Drawing::Polygons { back_to_front: back_to_front(source, scene, &drawn), target, slices: style.slices }
         }
     };
     let field = residency.field(source, drawn, style.join);
     let parts = PlanParts::new(field, rays, domain, sampling, scene.transfer.clone());
-    Ok(FramePlan::new(PlanParts { drawing, ..parts })?)
+    let lighting = scene.light.map(|light| Lighting::new(light, source.grid()));
+    Ok(FramePlan::new(PlanParts { lighting, drawing, ..parts })?)
 }
 
-/// The companions that a frame needs: where all samples are voxels, or all values look alike, spreads change nothing.
-fn companions(scene: &Scene, levels: &[Level], classification: Classification) -> &'static [Companion] {
+/// The companions of samples that a frame needs: where all samples are voxels, or all values look alike, spreads change nothing.
+fn companions(scene: &Scene, levels: &[Level], classification: Classification) -> Vec<Companion> {
     let is_coarse = levels.iter().any(|level| *level > Level(0));
-    match classification {
-        Classification::Prefiltered if is_coarse && scene.transfer.knots().len() > 1 => &[Companion::Spread],
-        _ => &[],
-    }
+    let is_needed = |companion: &Companion| match companion {
+        Companion::Spread => {
+            classification == Classification::Prefiltered && is_coarse && scene.transfer.knots().len() > 1
+        }
+        Companion::Gradient => scene.light.is_some_and(|light| light.normals() == Normals::Stored),
+    };
+    Companion::ALL.into_iter().filter(is_needed).collect()
 }
 
 fn check_levels(layout: &BlockLayout, levels: &[Level]) -> Result<(), PrepareBlocksError> {
@@ -202,9 +209,11 @@ fn back_to_front(source: &dyn BlockSource, scene: &Scene, drawn: &[bool]) -> Vec
 mod tests {
     use std::sync::Arc;
 
-    use brickfield_bricks::{BlockOptions, BlockVolume, build_blocks};
+    use brickfield_bricks::{BlockOptions, BlockVolume, BuildOptions, build_blocks, build_tree};
     use brickfield_core::glam::{DVec3, UVec2};
     use brickfield_core::{Camera, Grid, Interblock, Knot, Volume};
+    use brickfield_frame::Feature;
+    use brickfield_optics::{Light, LightSource, LightTerms};
     use proptest::prelude::*;
 
     use super::*;
@@ -213,6 +222,7 @@ mod tests {
     const BLENDED: BlockStyle = BlockStyle {
         join: Join::Blend(Interblock::MaximumDistance),
         transparent: TransparentBlocks::Empty,
+        slices: Slices::Together,
         classification: Classification::OfMean,
     };
 
@@ -238,6 +248,26 @@ mod tests {
             Some(chunk) => chunk.bytes().to_vec(),
             None => (slots.one_sample(i as u32).unwrap() as u16).to_le_bytes().to_vec(),
         }
+    }
+
+    #[test]
+    fn stored_normals_bring_gradients_which_bricks_do_not_have() {
+        let source = blocks(UVec3::new(20, 17, 9));
+        let levels: Vec<Level> = (0..source.layout().n_blocks_total()).map(|i| Level(i as u8 % 4)).collect();
+        let light = Light::new(LightSource::Head, LightTerms::default(), 900.0).unwrap();
+        let on = |normals| Scene { light: Some(light.on_normals(normals)), ..scene(&source) };
+        let mut residency = BlockResidency::default();
+        let mut plan = |normals| prepare_blocks(&source, &on(normals), &levels, BLENDED, &mut residency).unwrap();
+        let n_samples = |plan: &FramePlan| plan.field().slots().n_bytes() / 2;
+        let stored = plan(Normals::Stored);
+        let gradients = stored.gradients().unwrap();
+        assert_eq!(gradients.n_bytes(), 4 * n_samples(&stored));
+        assert!(stored.features().contains(Feature::StoredGradients));
+        let central = plan(Normals::Central);
+        assert!(central.gradients().is_none() && central.field().companions(Companion::Gradient).is_none());
+        let tree = build_tree(source.volume(), &BuildOptions::default()).unwrap();
+        let refused = crate::prepare(&tree, &on(Normals::Stored), &mut crate::Residency::default());
+        assert_eq!(refused.err(), Some(PrepareError::Plan(PlanError::NoGradients)));
     }
 
     #[test]

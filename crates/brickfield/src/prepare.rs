@@ -4,8 +4,8 @@ use brickfield_bricks::BrickTree;
 use brickfield_core::glam::{UVec2, UVec3};
 use brickfield_core::{Aabb, BrickId, BrickLayout, Level, ValueRange};
 use brickfield_frame::{
-    DarkRegions, Drawing, FramePlan, IndexEntry, Placement, PlacementError, PlanError, PlanParts, RayFrame,
-    SamplingError,
+    DarkRegions, Drawing, FramePlan, IndexEntry, Lighting, Placement, PlacementError, PlanError, PlanParts, RayFrame,
+    SamplingError, Slices,
 };
 use brickfield_lod::{Selection, back_to_front, select_cut};
 
@@ -120,7 +120,11 @@ fn plan_selection(
         Technique::RayCasting => Drawing::Rays,
         Technique::Polygons(target) => {
             check_polygons(tree, &rays, sampling.step_world(), resident.len())?;
-            Drawing::Polygons { back_to_front: from_back_to_front(tree, scene, &resident), target }
+            Drawing::Polygons {
+                back_to_front: from_back_to_front(tree, scene, &resident),
+                target,
+                slices: Slices::Together,
+            }
         }
     };
     let field = residency.hold(tree, resident);
@@ -130,7 +134,8 @@ fn plan_selection(
         _ => DarkRegions::default(),
     };
     let parts = PlanParts::new(field, rays, domain, sampling, scene.transfer.clone());
-    Ok(FramePlan::new(PlanParts { dark, drawing, ..parts })?)
+    let lighting = scene.light.map(|light| Lighting::new(light, tree.grid()));
+    Ok(FramePlan::new(PlanParts { lighting, dark, drawing, ..parts })?)
 }
 
 /// An index cell of each brick, the farthest brick first.
@@ -201,7 +206,8 @@ fn resident_bricks(
     let mut is_seen = |id: BrickId| !residency.is_transparent(tree, &scene.transfer, id);
     let in_domain = |id: &BrickId| !to_sample_space(tree.layout().index_box(*id)).intersection(domain).is_empty();
     let drawn = selection.drawn().filter(in_domain);
-    match segment_reach(tree.grid(), scene, tree.layout().side().n_cells()) {
+    match segment_reach(tree.grid(), scene, tree.layout().side().n_cells()).max(gradient_reach(tree, scene, selection))
+    {
         0 => drawn.filter(|id| is_seen(*id)).collect(),
         reach => {
             let seen = selection.cut().bricks().iter().copied().filter(|id| is_seen(*id));
@@ -209,6 +215,15 @@ fn resident_bricks(
             drawn.filter(|id| visibility.needs(*id)).collect()
         }
     }
+}
+
+/// How many bricks of level 0 a gradient may span beside a node, along an axis: a sample of the node's level. 0 without light.
+fn gradient_reach(tree: &BrickTree, scene: &Scene, selection: &Selection) -> u32 {
+    if scene.light.is_none() {
+        return 0;
+    }
+    let coarsest = selection.cut().bricks().iter().map(|id| id.level).max().unwrap_or(Level(0));
+    coarsest.stride().div_ceil(tree.layout().side().n_cells())
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use brickfield_core::glam::UVec2;
 use brickfield_core::{Aabb, Camera, TransferFunction};
 use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
 use brickfield_lod::{Criterion, Culling, View};
-use brickfield_optics::QuadratureRule;
+use brickfield_optics::{Light, QuadratureRule};
 
 /// A scene to render: everything but the volume.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +15,8 @@ pub struct Scene {
     pub size: UVec2,
     /// Extinction per world unit and colour over data values.
     pub transfer: TransferFunction,
+    /// The light on surfaces; `None` where the medium only emits.
+    pub light: Option<Light>,
     /// Distance between samples, in units of the volume's least spacing.
     pub step_voxels: f64,
     /// How a segment is integrated.
@@ -86,12 +88,13 @@ pub enum Skipping {
 }
 
 impl Scene {
-    /// A scene with the defaults: midpoint rule, exact mode, shells of whole rays, half a voxel a step, full resolution, no clipping, skipping.
+    /// A scene with the defaults: no light, midpoint rule, exact mode, shells of whole rays, half a voxel a step, full resolution, no clipping, skipping.
     pub fn new(camera: Camera, size: UVec2, transfer: TransferFunction) -> Scene {
         Scene {
             camera,
             size,
             transfer,
+            light: None,
             step_voxels: 0.5,
             rule: QuadratureRule::MidpointExponential,
             mode: Mode::Exact,

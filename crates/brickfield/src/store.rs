@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use brickfield_bricks::{BlockSource, FetchError, SourceId, average_box, block_summaries};
 use brickfield_core::glam::UVec3;
 use brickfield_core::{
-    BlockLayout, BlockSide, BlockSummary, Grid, Level, Rescale, Scalar, ScalarType, ValueRange, Voxels, with_voxels,
+    BlockLayout, BlockSide, BlockSummary, Grid, Level, Rescale, Scalar, ScalarType, ValueRange, Volume, Voxels,
+    with_voxels,
 };
 use brickfield_io::ome_zarr::ZarrLevels;
 use brickfield_io::{Limits, OpenError, OpenOptions, ReadError, VolumeFacts};
@@ -15,10 +16,18 @@ use crate::pack::finite_for;
 /// How much memory a store may take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StoreLimits {
-    /// Most bytes of unpacked chunks that are kept.
+    /// Most bytes of unpacked chunks that are kept; of one that is larger, its own.
     pub cache_bytes: u64,
     /// Most bytes of the summaries of all blocks, and most bytes of one unpacked chunk.
     pub max_bytes: u64,
+}
+
+impl StoreLimits {
+    /// Limits for a store whose blocks and chunks share a budget: a quarter of it is for chunks, at most 64 MiB.
+    pub fn of_budget(n_bytes: u64) -> StoreLimits {
+        let most = StoreLimits::default();
+        StoreLimits { cache_bytes: most.cache_bytes.min(n_bytes / 4), ..most }
+    }
 }
 
 impl Default for StoreLimits {
@@ -63,7 +72,7 @@ pub struct SummaryProgress {
 impl StoreBlocks {
     /// Opens a store; of several images, channels and times `options` choose. The limits of `options` are not asked.
     ///
-    /// A store that states no summaries is read once, 32 slices at a time, and twice if it has voxels that are not finite; `progress` is told.
+    /// A store that states no summaries is read once, 32 slices at a time, and twice if its voxels are floats; `progress` is told.
     ///
     /// # Errors
     /// What the reader says; chunks or summaries beyond the limits.
@@ -132,6 +141,31 @@ impl StoreBlocks {
     /// store is an error.
     pub fn n_missing_chunks(&self) -> u64 {
         self.levels.n_missing_chunks()
+    }
+
+    /// The volume at the finest level of the store that takes no more than `max_bytes`; if none does, the voxels' mean in each block.
+    ///
+    /// # Errors
+    /// What the reader says.
+    pub fn overview(&self, max_bytes: u64) -> Result<Volume, OpenError> {
+        self.coarse(max_bytes).map_err(|fault| OpenError { path: self.path.clone(), fault })
+    }
+
+    fn coarse(&self, max_bytes: u64) -> Result<Volume, ReadError> {
+        let n_bytes = |dims: UVec3| dims.as_u64vec3().element_product() * self.scalar_type().n_bytes() as u64;
+        let level = (0..self.levels.n_levels()).find(|level| n_bytes(self.levels.dims(*level)) <= max_bytes);
+        let (dims, voxels, rescale) = match level {
+            Some(level) => {
+                let dims = self.levels.dims(level);
+                (dims, self.levels.box_voxels(level, UVec3::ZERO, dims)?, self.rescale())
+            }
+            None => {
+                let means = self.summaries.iter().map(|summary| summary.mean).collect();
+                (self.layout.n_blocks(), Voxels::F64(means), Rescale::IDENTITY)
+            }
+        };
+        let spacing = self.grid().spacing() * self.layout.dims().as_dvec3() / dims.as_dvec3();
+        Ok(Volume::rescaled(Grid::axis_aligned(dims, spacing)?, voxels, rescale)?)
     }
 
     /// The samples of a block, of a level of the store.

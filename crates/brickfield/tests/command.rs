@@ -179,6 +179,38 @@ fn criteria_are_listed_or_repeated() {
     assert!(!both.contains("error:"), "{both}");
 }
 
+#[test]
+#[cfg(feature = "formats")]
+fn a_store_is_drawn_like_the_file_by_the_parts_that_its_blocks_need() {
+    let place = WorkFolder::new();
+    assert_eq!(place.run("pack|a.nrrd|-o|a.zarr").status.code(), Some(0));
+    let picture = |file: &str, words: &str| {
+        let out = place.run(&format!("render|{file}|-o|b.png|{SMALL}|--blocks|8|{words}"));
+        assert_eq!(out.status.code(), Some(0), "{words}: {}", text(&out.stderr));
+        (image::open(place.path().join("b.png")).unwrap().to_rgb8().into_raw(), text(&out.stdout))
+    };
+    for words in ["--block-level|0", "--block-level|1|--transfer|ramp", "--ratio|8", "--transfer|viridis|--ratio|20"] {
+        let ((of_file, _), (of_store, said)) = (picture("a.nrrd", words), picture("a.zarr", words));
+        assert_eq!(of_file, of_store, "{words}");
+        assert!(said.contains("MiB of the store\nkept beside the blocks: "), "{said}");
+    }
+    // Chunks that are lost or damaged are named, and no picture is left.
+    std::fs::remove_file(place.path().join("b.png")).unwrap();
+    let chunk = place.path().join("a.zarr/0/c/0/0/0");
+    let whole = std::fs::read(&chunk).unwrap();
+    for content in [Some(&whole[..whole.len() / 2]), None] {
+        match content {
+            Some(content) => std::fs::write(&chunk, content).unwrap(),
+            None => std::fs::remove_file(&chunk).unwrap(),
+        }
+        let out = place.run(&format!("render|a.zarr|-o|b.png|{SMALL}|--blocks|8|--transfer|ramp"));
+        assert_eq!(out.status.code(), Some(1));
+        let said = text(&out.stderr);
+        assert!(said.contains("a.zarr: ") && said.contains("block (0, 0, 0) of level 0"), "{said}");
+        assert!(!place.path().join("b.png").exists());
+    }
+}
+
 const SMALL: &str = "--backend|cpu|--size|24x18";
 
 impl WorkFolder {
@@ -232,6 +264,22 @@ fn polygons_imply_tessellated_shells_and_bricks() {
 }
 
 #[test]
+fn light_falls_on_bricks_and_on_blocks() {
+    let place = WorkFolder::new();
+    let (unlit, lit) = (place.pixels(""), place.pixels("|--light|head"));
+    assert_ne!(unlit, lit);
+    // Light that is the colour itself, on nothing steep enough to be a surface.
+    assert_eq!(place.pixels("|--light|-1,2,3|--flat-below|1e30"), unlit);
+    let sides =
+        |which: &str| place.pixels(&format!("|--blocks|8|--light|place=1,-9,4|--specular|0|--lit-sides|{which}"));
+    let (lower, both) = (sides("lower"), sides("both"));
+    assert!(lower != both && lower.iter().zip(&both).all(|(a, b)| a <= b));
+    let stored = place.pixels("|--blocks|8|--light|place=1,-9,4|--specular|0|--normals|stored");
+    let differences = || stored.iter().zip(&lower).map(|(a, b)| a.abs_diff(*b));
+    assert!(stored != lower && differences().all(|d| d < 128), "{:?}", differences().max());
+}
+
+#[test]
 fn bricks_are_shown_over_the_picture_and_in_the_legend() {
     let place = WorkFolder::new();
     let (plain, shown) = (place.pixels(""), place.pixels("|--show-bricks"));
@@ -261,7 +309,7 @@ fn bricks_that_show_nothing_are_boxes_only_if_all_are_asked_for() {
 }
 
 /// Arguments after `render`, the status, and what the message must hold.
-const REFUSED: [(&str, i32, &str); 37] = [
+const REFUSED: [(&str, i32, &str); 46] = [
     ("b.nrrd|-o|a.png", 1, "b.nrrd"),
     ("a.nrrd|-o|a.jpg", 2, "a.jpg: pictures are written as .exr or .png"),
     ("a.nrrd|-o|no/a.png", 2, "no/a.png: there is no folder no"),
@@ -302,6 +350,23 @@ const REFUSED: [(&str, i32, &str); 37] = [
     ("a.nrrd|-o|a.png|--lengths|nominal|--rule|gauss2", 2, "--lengths nominal and --rule gauss2 exclude each other"),
     ("a.nrrd|-o|a.png|--show-bricks=hidden", 2, "drawn or all"),
     ("a.nrrd|-o|a.png|--validation|--backend|cpu", 2, "--validation"),
+    ("a.nrrd|-o|a.png|--light|lamp", 2, "head, the direction X,Y,Z towards the light, or place=X,Y,Z"),
+    (
+        "a.nrrd|-o|a.png|--light|0,0,0",
+        2,
+        "--light: a light from direction [0, 0, 0]; it must be finite and longer than 0",
+    ),
+    ("a.nrrd|-o|a.png|--light|head|--diffuse|-1", 2, "--light: diffuse light of -1; it must be 0 to 16"),
+    ("a.nrrd|-o|a.png|--light|head|--specular|nan", 2, "--light: specular light of NaN"),
+    ("a.nrrd|-o|a.png|--light|head|--shininess|0", 2, "--light: a shininess of 0; it must be 1 to 255"),
+    (
+        "a.nrrd|-o|a.png|--light|head|--flat-below|0",
+        2,
+        "a gradient of 0 data values per world unit; it must be finite and above 0",
+    ),
+    ("a.nrrd|-o|a.png|--light|head|--lit-sides|left", 2, "lower or both"),
+    ("a.nrrd|-o|a.png|--light|head|--normals|stored", 2, "--blocks <N>"),
+    ("a.nrrd|-o|a.png|--ambient|1", 2, "--light <FROM>"),
     ("a.nrrd|-o|.|--size|8x8", 2, "exr or .png"),
     ("a.nrrd|-o|a.png|--raw|99x99x99,u8", 1, "a.nrrd"),
 ];

@@ -6,7 +6,7 @@
 use brickfield::Scene;
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Aabb, BrickSide, Image, Ray, Volume};
-use brickfield_optics::RayState;
+use brickfield_optics::{Light, LightSource, RayState, Shade};
 use rayon::prelude::*;
 
 use super::samples::{Samples, VolumeSamples};
@@ -30,10 +30,38 @@ fn pixel_of(volume: &Volume, side: BrickSide, scene: &Scene, (x, y): (u32, u32))
     let value = |t: f64| VolumeSamples(volume).around(ray.at(t) - 0.5).map_or(0.0, |c| c.value());
     let mut state = RayState::default();
     for segment in segments(volume, side, scene, (x, y), span) {
-        let values: Vec<f64> = scene.rule.nodes().iter().map(|n| value(segment.at(*n))).collect();
-        state.push(scene.rule.segment(&scene.transfer, &values, segment.length));
+        let node = |x: &f64| {
+            let t = segment.at(*x);
+            let shade = scene.light.map(|light| shade(volume, &light, &world, t));
+            (value(t), shade.unwrap_or(Shade::NONE))
+        };
+        let nodes: Vec<(f64, Shade)> = scene.rule.nodes().iter().map(node).collect();
+        state.push(scene.rule.lit_segment(&scene.transfer, &nodes, segment.length));
     }
     state.rgba()
+}
+
+/// The shade at a parameter of a ray in the world.
+fn shade(volume: &Volume, light: &Light, ray: &Ray, t: f64) -> Shade {
+    let grid = volume.grid();
+    let last = (grid.dims() - 1).as_dvec3();
+    let q = (grid.world_to_index().transform_point3(ray.at(t)) - 0.5).clamp(DVec3::ZERO, last);
+    let value = |q: DVec3| VolumeSamples(volume).around(q).map_or(0.0, |c| c.value());
+    // Change of the value along each of the grid's axes, a voxel to both sides where there is one.
+    let along = [0, 1, 2].map(|axis| {
+        let (mut low, mut high) = (q, q);
+        low[axis] = (q[axis] - 1.0).max(0.0);
+        high[axis] = (q[axis] + 1.0).min(last[axis]);
+        if high == low { 0.0 } else { (value(high) - value(low)) / (high[axis] - low[axis]) }
+    });
+    // A step along an axis changes the value by its product with the gradient.
+    let gradient = grid.index_to_world().matrix3.transpose().inverse() * DVec3::from(along);
+    let to_light = match light.source() {
+        LightSource::Head => -ray.direction,
+        LightSource::Direction(direction) => direction,
+        LightSource::Place(place) => (place - ray.at(t)).normalize_or_zero(),
+    };
+    light.shade(gradient, to_light, -ray.direction)
 }
 
 fn in_index_space(volume: &Volume, ray: &Ray) -> Ray {

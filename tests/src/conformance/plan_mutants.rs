@@ -6,9 +6,9 @@ use brickfield::frame::{
     Chunk, Chunked, Decode, Feature, FramePlan, IndexEntry, IndexGrid, Mode, ProxyCorner, ProxyGeometry, Reach,
     SampleFormat, Sampling, Slots, SpoiltPlan,
 };
-use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::glam::{DVec3, UVec3, Vec3Swizzles};
 use brickfield_core::{Aabb, Knot, TransferFunction};
-use brickfield_optics::QuadratureRule;
+use brickfield_optics::{Light, LightSource, LightTerms, QuadratureRule};
 
 /// One thing wrong with a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -79,13 +79,21 @@ pub enum PlanMutant {
     ExitsMissing,
     /// Of three stacks of planes, the stack across z is missing.
     StackMissing,
+    /// Of flat blocks only what lies among their own samples is drawn, not what lies between blocks.
+    BetweenMissing,
     /// The picture of all earlier batches is forgotten when the last batch begins.
     BatchesForgotten,
+    /// Surfaces begin at a gradient a fifth higher.
+    FlatBelowScaled,
+    /// Diffuse light is 5 % too dim.
+    DiffuseDimmed,
+    /// A light that is elsewhere than the eye has x and y swapped.
+    LightTurned,
 }
 
 impl PlanMutant {
     /// All plan mutants.
-    pub const ALL: [PlanMutant; 34] = [
+    pub const ALL: [PlanMutant; 38] = [
         PlanMutant::AnchorHalfVoxel,
         PlanMutant::PixelCorner,
         PlanMutant::RowsFlipped,
@@ -119,7 +127,11 @@ impl PlanMutant {
         PlanMutant::PolygonsMissing,
         PlanMutant::ExitsMissing,
         PlanMutant::StackMissing,
+        PlanMutant::BetweenMissing,
         PlanMutant::BatchesForgotten,
+        PlanMutant::FlatBelowScaled,
+        PlanMutant::DiffuseDimmed,
+        PlanMutant::LightTurned,
     ];
 
     /// The mutant's name in reports.
@@ -158,14 +170,23 @@ impl PlanMutant {
             PlanMutant::PolygonsMissing => "plan/polygons-missing",
             PlanMutant::ExitsMissing => "plan/exits-missing",
             PlanMutant::StackMissing => "plan/stack-missing",
+            PlanMutant::BetweenMissing => "plan/between-missing",
             PlanMutant::BatchesForgotten => "plan/batches-forgotten",
+            PlanMutant::FlatBelowScaled => "plan/flat-below-scaled",
+            PlanMutant::DiffuseDimmed => "plan/diffuse-dimmed",
+            PlanMutant::LightTurned => "plan/light-turned",
         }
     }
 
     /// Whether it is in the polygons, which only backends with a rasteriser draw.
     pub fn is_of_polygons(self) -> bool {
-        use PlanMutant::{BatchesForgotten, ExitsMissing, PolygonsMissing, PolygonsReversed, StackMissing};
-        matches!(self, PolygonsReversed | PolygonsMissing | ExitsMissing | StackMissing | BatchesForgotten)
+        use PlanMutant::{
+            BatchesForgotten, BetweenMissing, ExitsMissing, PolygonsMissing, PolygonsReversed, StackMissing,
+        };
+        matches!(
+            self,
+            PolygonsReversed | PolygonsMissing | ExitsMissing | StackMissing | BetweenMissing | BatchesForgotten
+        )
     }
 
     /// The plan with this thing wrong.
@@ -220,9 +241,32 @@ impl PlanMutant {
             }),
             PlanMutant::ExitsMissing => drop_triangles(plan, |corner| corner.surface == ProxyCorner::EXIT),
             PlanMutant::StackMissing => drop_triangles(plan, |corner| corner.owner / 2 == 2),
+            PlanMutant::BetweenMissing => drop_triangles(plan, |corner| corner.brick % 2 == 1),
             PlanMutant::BatchesForgotten => forget_batches(plan),
+            PlanMutant::FlatBelowScaled => {
+                relight(plan, |light| (light.source(), light.terms(), 1.2 * light.flat_below()))
+            }
+            PlanMutant::DiffuseDimmed => relight(plan, |light| {
+                let terms = LightTerms { diffuse: 0.95 * light.terms().diffuse, ..light.terms() };
+                (light.source(), terms, light.flat_below())
+            }),
+            PlanMutant::LightTurned => relight(plan, |light| {
+                let source = match light.source() {
+                    LightSource::Head => LightSource::Head,
+                    LightSource::Direction(d) => LightSource::Direction(d.yxz()),
+                    LightSource::Place(p) => LightSource::Place(p.yxz()),
+                };
+                (source, light.terms(), light.flat_below())
+            }),
         }
     }
+}
+
+fn relight(plan: &mut SpoiltPlan, change: impl Fn(&Light) -> (LightSource, LightTerms, f64)) {
+    let Some(lighting) = &mut plan.lighting else { return };
+    let (source, terms, flat_below) = change(&lighting.light);
+    let light = Light::new(source, terms, flat_below).expect("a mutant's light is one");
+    lighting.light = light.on_sides(lighting.light.sides());
 }
 
 fn edit_triangles(plan: &mut SpoiltPlan, edit: impl Fn(&[ProxyCorner], &mut [[u32; 3]])) {
@@ -277,7 +321,7 @@ fn whole(plan: &SpoiltPlan) -> Aabb {
 /// One brick whose samples all have the greatest stored value, everywhere.
 fn show_ghosts(plan: &mut SpoiltPlan) {
     let sample: &[u8] = match plan.slots.format() {
-        SampleFormat::Unorm8 | SampleFormat::Unorm16 => &[0xff],
+        SampleFormat::Unorm8 | SampleFormat::Unorm8x4 | SampleFormat::Unorm16 => &[0xff],
         SampleFormat::Float32 => &[0, 0, 0x80, 0x3f],
     };
     let bytes: Vec<u8> = sample.iter().copied().cycle().take(plan.slots.chunk_bytes()).collect();

@@ -4,6 +4,8 @@
 //! 2.5e-4 above, for no sum is longer than 8,192 segments and the sums of passes are few; 99.9 % of the pixels within 1e-5.
 //! Both are wider by the reference's `ambiguity` of the pixel; the narrow one also by the effect of one rounding of each term of a
 //! position may change (`position_rounding`), which is more than 1e-5 where the transfer function is steep and opaque.
+//! With light both are wider by that: gradients amplify roundings, the more, the less a surface needs of one. Where colours in the light
+//! are above 1, what is hidden or shown by rounding is brighter by as much.
 //!
 //! **Fast mode** adds, per pixel, the effect of hardware filtering (`filter_rounding`) and, where a ray may end early, the
 //! transmittance floor: that is the most that any channel can lose behind the point where it ends.
@@ -17,6 +19,7 @@ use brickfield::cpu::{Discrete, filter_rounding, position_rounding};
 use brickfield::frame::{Capabilities, Division, FramePlan, Mode, Target};
 use brickfield_core::glam::UVec2;
 use brickfield_core::{Image, TransferFunction};
+use brickfield_optics::Shade;
 
 use crate::metrics::{Errors, MetricError, errors, quantile};
 
@@ -94,7 +97,9 @@ impl PlanTolerance {
         let (blended, rounding) = (blending(plan, reference), position_rounding(plan));
         let of_pixel = |bound: f64| reference.ambiguity.iter().zip(&blended).map(move |(a, b)| bound + a + b);
         let bulk = of_pixel(BULK_BOUND).zip(&rounding).map(|(b, r)| b + r).collect();
-        Ok(PlanTolerance { wide, tolerance: Tolerance { most: of_pixel(wide).collect(), bulk } })
+        let amplified = |rounding: f64| if plan.lighting().is_some() { rounding } else { 0.0 };
+        let most = of_pixel(wide).zip(&rounding).map(|(m, r)| m + amplified(*r)).collect();
+        Ok(PlanTolerance { wide, tolerance: Tolerance { most, bulk } })
     }
 
     /// The rule on devices that filter with weights of so many bits; for the plan and the answer that it was made of.
@@ -103,7 +108,8 @@ impl PlanTolerance {
         let filter = filter_rounding(plan, sub_texel_bits);
         let ends = |i: usize| {
             let transmittance = 1.0 - reference.image.pixels()[i][3];
-            if transmittance <= transmittance_floor + filter[i] + self.wide { transmittance_floor } else { 0.0 }
+            let lost = transmittance_floor * brightness(plan);
+            if transmittance <= transmittance_floor + filter[i] + self.wide { lost } else { 0.0 }
         };
         let fast = |exact: &[f64]| exact.iter().enumerate().map(|(i, e)| e + filter[i] + ends(i)).collect();
         Tolerance { most: fast(&self.tolerance.most), bulk: fast(&self.tolerance.bulk) }
@@ -153,17 +159,18 @@ impl Tolerance {
 }
 
 /// The law of every picture, whatever its reference: 0 <= alpha <= 1, and colours within alpha times the transfer
-/// function's greatest, to the rounding of f32 and of the format in which pixels are blended.
+/// function's greatest (in the brightest shade), to the rounding of f32 and of the format in which pixels are blended.
 pub(crate) fn bounded(image: &Image<f32>, plan: &FramePlan, reference: &Discrete) -> Option<Complaint> {
     let rounding = match plan.proxy().map(|proxy| proxy.target()) {
         None | Some(Target::Float32) => 0.0,
         Some(Target::Float16) => blending(plan, reference).into_iter().fold(0.0, f64::max),
     };
-    within_hull(image, plan.transfer(), rounding)
+    within_hull(image, plan.transfer(), brightest(plan), rounding)
 }
 
-fn within_hull(image: &Image<f32>, transfer: &TransferFunction, rounding: f64) -> Option<Complaint> {
-    let greatest = |c: usize| transfer.knots().iter().map(|k| k.color[c]).fold(0.0, f64::max);
+fn within_hull(image: &Image<f32>, transfer: &TransferFunction, light: Shade, rounding: f64) -> Option<Complaint> {
+    let greatest_of = |c: usize| transfer.knots().iter().map(|k| k.color[c]).fold(0.0, f64::max);
+    let greatest = |c: usize| greatest_of(c) * light.factor + light.highlight;
     let hull = [greatest(0), greatest(1), greatest(2)];
     let wrong = |p: &[f32; 4]| {
         let [r, g, b, a] = p.map(f64::from);
@@ -177,6 +184,17 @@ fn within_hull(image: &Image<f32>, transfer: &TransferFunction, rounding: f64) -
     };
     let (i, what) = image.pixels().iter().enumerate().find_map(|(i, p)| wrong(p).map(|w| (i, w)))?;
     Some(Complaint::Bounded { pixel: pixel(image.size(), i), what })
+}
+
+/// The greatest factor and highlight of colours.
+fn brightest(plan: &FramePlan) -> Shade {
+    plan.lighting().map_or(Shade::NONE, |lighting| lighting.light.brightest())
+}
+
+/// The greatest channel of a colour, at least 1.
+fn brightness(plan: &FramePlan) -> f64 {
+    let Shade { factor, highlight } = brightest(plan);
+    factor + highlight
 }
 
 /// Greatest difference of any channel, pixel by pixel.
@@ -205,7 +223,7 @@ fn blending(plan: &FramePlan, reference: &Discrete) -> Vec<f64> {
         Some(Target::Float32) => 3.0 * (-24f64).exp2(),
         Some(Target::Float16) => 3.0 * (-11f64).exp2(),
     };
-    reference.visible_segments.iter().map(|n| rounding * f64::from(*n)).collect()
+    reference.visible_segments.iter().map(|n| rounding * brightness(plan) * f64::from(*n)).collect()
 }
 
 /// Most samples on any ray: the domain's diagonal in steps, along the direction that is slowest through it.
@@ -271,7 +289,8 @@ mod tests {
     fn what_is_not_a_picture_fails() {
         assert!(matches!(complaint(&tolerance(None), f64::NAN, 1), Some(Complaint::NotComparable(_))));
         let transfer = TransferFunction::constant(1.0, [0.9, 0.3, 0.1]).unwrap();
-        let pixel = |p: [f32; 4]| within_hull(&Image::new(UVec2::ONE, vec![p]).unwrap(), &transfer, 0.0).is_none();
+        let pixel =
+            |p: [f32; 4]| within_hull(&Image::new(UVec2::ONE, vec![p]).unwrap(), &transfer, Shade::NONE, 0.0).is_none();
         assert!(pixel([0.0; 4]) && pixel([0.45, 0.15, 0.05, 0.5]));
         assert!(!pixel([0.5, 0.0, 0.0, 0.5]) && !pixel([0.0, 0.0, 0.0, 1.1]) && !pixel([-0.1, 0.0, 0.0, 0.5]));
     }

@@ -220,6 +220,48 @@ mutants! {
         => "area.first = block.corner;";
     /// Slots are read as if they were of level 0.
     PLACED_SCALE: "placed-scale", "field/placed", "patch_of", "area.scale = 1.0 / f32(1u << place.level);" => "area.scale = 1.0;";
+    /// Gradients are of the grid's axes, not of the world's.
+    NORMAL_OF_THE_GRID: "normal-of-the-grid", "light", "shade_at",
+        "light.steepness_x.xyz * slope.x + light.steepness_y.xyz * slope.y + light.steepness_z.xyz * slope.z"
+        => "slope * length(light.steepness_x.xyz)";
+    /// Light comes from the other side.
+    LIGHT_FROM_BEHIND: "light-from-behind", "light", "towards_light", "light.source.xyz - light.source.w * in_world(p)"
+        => "light.source.w * in_world(p) - light.source.xyz";
+    /// The way to a near light is counted in voxels.
+    LIGHT_IN_VOXELS: "light-in-voxels", "light", "towards_light", "in_world(p)" => "p";
+    /// Every medium is a surface.
+    SURFACES_EVERYWHERE: "surfaces-everywhere", "light", "shade_at", "sqrt(square / (1.0 + square))" => "1.0";
+    /// Highlights where there is hardly a surface.
+    HIGHLIGHT_WITHOUT_STRENGTH: "highlight-without-strength", "light", "shade_of", "strength * light.specular" => "light.specular";
+    /// Highlights face the eye.
+    NOT_HALFWAY: "not-halfway", "light", "shade_at", "dot(normal, halfway)" => "dot(normal, to_eye)";
+    /// The side of higher values is never lit.
+    BACK_IN_THE_DARK: "back-in-the-dark", "light", "facing", "light.back.x * cosine" => "0.0";
+    /// Pre-integrated segments have the shade of their near end.
+    NEAR_SHADE_ALONE: "near-shade-alone", "light", "between", "0.5 * (near.factor + far.factor)" => "near.factor";
+    /// Gradients do not ask the next brick.
+    GRADIENT_OF_ONE_PATCH: "gradient-of-one-patch", "gradient/central", "beside", "all(p >= area.region.low) && all(p < area.region.high)"
+        => "true";
+    /// Slopes are over two steps, even where the volume ends.
+    SLOPE_OVER_TWO_STEPS: "slope-over-two-steps", "gradient/central", "slope", "dot(behind.at - before.at, vec3f(1.0))"
+        => "2.0 * dot(way, vec3f(1.0))";
+    /// Gradients of coarse bricks are taken from neighbouring voxels.
+    SPACING_OF_LEVEL_0: "spacing-of-level-0", "field/bricks", "spacing_at", "return 1.0 / area.scale;" => "return 1.0;";
+    /// Gradients between blocks are taken over the spacing of one of them.
+    SPACING_OF_OWN_BLOCK: "spacing-of-own-block", "field/blocks", "spacing_at",
+        "dot(weights.low, strides.low) + dot(weights.high, strides.high)" => "area.samples.stride";
+    /// The root of a stored gradient's length is its length.
+    STORED_LENGTH_NOT_SQUARED: "stored-length-not-squared", "gradient/stored", "gradient_at", "codes.w * codes.w" => "codes.w";
+    /// Stored directions have no negative components.
+    STORED_DIRECTION_UNSIGNED: "stored-direction-unsigned", "gradient/stored", "gradient_at", "(codes.xyz * 255.0 - ZERO) / ZERO"
+        => "codes.xyz";
+    /// Blocks of one sample have no gradient.
+    ONE_GRADIENT_FORGOTTEN: "one-gradient-forgotten", "field/blocks", "codes_among",
+        "unpack4x8unorm(one_gradients[cell_number(cell)])" => "vec4f(0.0)";
+    /// Stored gradients are of the nearest block alone.
+    STORED_ACROSS_BLOCKS: "stored-across-blocks", "field/blocks", "codes_at",
+        "sum += weight * codes_among(samples_of(cell, blocks[cell_number(cell)]), cell, p);"
+        => "sum += weight * codes_among(area.samples, area.cell, p);";
     /// Opacity is the depth.
     OPACITY_IS_DEPTH: "opacity-is-depth", "march", "march", "vec4f(seen.rgb, alpha(seen.w))" => "vec4f(seen.rgb, min(seen.w, 1.0))";
 }

@@ -31,6 +31,7 @@ impl Storage {
             (Storage::Placed | Storage::Averages, _) => placed(plan.field()),
         };
         let parts = PlanParts::new(field, *plan.rays(), *plan.domain(), *plan.sampling(), plan.transfer().clone());
+        let parts = PlanParts { lighting: plan.lighting().copied(), ..parts };
         FramePlan::new(parts).expect("the parts of a plan, but for its field")
     }
 }

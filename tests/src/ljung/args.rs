@@ -1,7 +1,10 @@
 //! The options of `compare --paper ljung`.
 
+use std::path::PathBuf;
+
 use brickfield::options::values;
 use brickfield_core::BlockSide;
+use brickfield_core::glam::UVec3;
 use clap::{Parser, ValueEnum};
 
 use crate::paper::PaperArgs;
@@ -33,6 +36,15 @@ pub struct LjungArgs {
     /// Voxels along a side of the generated volume
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(32..=1024))]
     pub volume_side: u32,
+    /// An OME-Zarr for the part `store`, instead of a generated one in the output folder
+    #[arg(long, value_name = "STORE")]
+    pub store: Option<PathBuf>,
+    /// Voxels of the generated store along x, y, z
+    #[arg(long, value_name = "NXxNYxNZ", default_value = "1024x1024x2048", value_parser = dims)]
+    pub store_dims: UVec3,
+    /// What the voxels of the store may take on the host, and on the device, in MiB
+    #[arg(long, value_name = "MIB", default_value_t = 256, value_parser = clap::value_parser!(u64).range(1..1 << 20))]
+    pub store_mib: u64,
 }
 
 /// The parts of a run.
@@ -44,6 +56,8 @@ pub enum Part {
     Weights,
     /// Jumps on faces, edges and corners of blocks
     Continuity,
+    /// A ball in the light, whose normals are known
+    Light,
     /// Figure 9: the bytes of blocks at given levels
     Accounting,
     /// Error against the full resolution, time and bytes, at several budgets
@@ -56,6 +70,8 @@ pub enum Part {
     Reselect,
     /// Classification of averages against prefiltered classification: error and bytes
     Classify,
+    /// A store larger than its budget: memory, bytes and error
+    Store,
     /// Pictures of each volume, with and without interpolation between blocks
     Figures,
 }
@@ -67,12 +83,14 @@ impl Part {
             Part::Gradient => "Figure 7: a rotated linear gradient",
             Part::Weights => "Figures 4 and 5: weights",
             Part::Continuity => "Continuity, and equal resolutions",
+            Part::Light => "A ball in the light",
             Part::Accounting => "Figure 9: bytes",
             Part::Table => "Error, time and bytes",
             Part::Cost => "Cost of interpolation between blocks",
             Part::Rank => "Estimated and exact error of blocks",
             Part::Reselect => "Reselection after an edit of the transfer function",
             Part::Classify => "Prefiltered classification",
+            Part::Store => "A store larger than its budget",
             Part::Figures => "Pictures",
         }
     }
@@ -89,6 +107,12 @@ impl LjungArgs {
         let all = Part::value_variants().iter().copied();
         all.filter(|part| self.part.is_empty() || self.part.contains(part)).collect()
     }
+}
+
+/// Three numbers of voxels.
+fn dims(text: &str) -> Result<UVec3, String> {
+    let spec = values::raw_spec(&format!("{text},u8")).map_err(|e| e.to_string())?;
+    Ok(spec.dims)
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ use serde::Serialize;
 
 use super::LjungArgs;
 use super::schemes::{joins, name, style};
+use super::warped::Warped;
 use crate::compare::rivals::Rivals;
 use crate::metrics::quantile;
 use crate::paper::panels::{beside, heat_pixel, stacked};
@@ -60,7 +61,9 @@ pub(super) fn run(args: &LjungArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
     for (i, backend) in rivals.present.iter_mut().enumerate() {
         let mut pictures = Vec::new();
         for join in joins() {
-            let (row, picture) = of_scheme(args, backend.as_mut(), &blocks, join)?;
+            let names = (backend.describe().backend, name(join));
+            let values = |levels: &[Level]| values(backend.as_mut(), &plan(&blocks, levels, join)?);
+            let (row, picture) = of_scheme(args, &blocks, names, values)?;
             print(&line(&row))?;
             rows.push(row);
             pictures.push(picture);
@@ -74,8 +77,54 @@ pub(super) fn run(args: &LjungArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
             args.common.write_picture("figure7", &stacked(&rows), &what)?;
         }
     }
+    let missed = missed(&rows);
+    let (row, picture) = of_scheme(args, &blocks, ("f64", "warped"), |levels| {
+        let warped = Warped::new(&blocks, levels)?;
+        Ok((0..SIDE * SIDE).map(|i| warped.value(position(i))).collect())
+    })?;
+    print(&line(&row))?;
+    args.common.write_picture("figure7-warped", &stacked(&picture), "warped coordinates; below, Delta E as before")?;
+    print(&jumps(&blocks)?)?;
+    rows.push(row);
     args.common.write_rows("gradient.json", &rows)?;
-    Ok(missed(&rows))
+    Ok(missed)
+}
+
+/// How far warped values jump at the faces of blocks, and at the planes of their outer samples.
+fn jumps(blocks: &BlockVolume) -> Result<String, PaperError> {
+    /// Samples.
+    const STEP: f64 = 1e-7;
+    let layout = blocks.layout();
+    let levels = BlockLevels::random(*layout, 0);
+    let levels = levels.levels();
+    let warped = Warped::new(blocks, levels)?;
+    let (mut at_faces, mut anywhere) = (0.0f64, 0.0f64);
+    for (block, level) in layout.blocks().zip(levels) {
+        let (first, last) = layout.sample_ends(block, *level);
+        let face = layout.first_voxel(block).as_dvec3() - 0.5;
+        for (axis, along) in [(0, 1), (1, 0)] {
+            for plane in [first[axis], last[axis], face[axis]] {
+                for i in 0..SIDE {
+                    let mut q = position(0);
+                    (q[axis], q[along]) = (plane, face[along] + 32.0 * (f64::from(i) + 0.5) / f64::from(SIDE));
+                    let beside = [-STEP, STEP].map(|step| {
+                        let mut beside = q;
+                        beside[axis] += step;
+                        warped.value(beside.clamp(DVec3::ZERO, DVec3::new(255.0, 255.0, 0.0)))
+                    });
+                    let jump = (beside[1] - beside[0]).abs();
+                    anywhere = anywhere.max(jump);
+                    if warped.is_off_edges(q, axis) {
+                        at_faces = at_faces.max(jump);
+                    }
+                }
+            }
+        }
+    }
+    Ok(format!(
+        "warped: it jumps by {at_faces:.1e} of the range at faces, by {anywhere:.1e} at edges, within {:.0e} samples",
+        2.0 * STEP
+    ))
 }
 
 fn line(row: &GradientRow) -> String {
@@ -111,17 +160,18 @@ fn grey(value: f64) -> LinearRgb {
     [Srgb::new(encoded, encoded, encoded).into_linear::<f64>().red; 3]
 }
 
+/// The differences of a scheme, by the values that it has at all positions for blocks of given levels.
 fn of_scheme(
     args: &LjungArgs,
-    backend: &mut dyn Backend,
     blocks: &BlockVolume,
-    join: Join,
+    (backend, scheme): (&'static str, &'static str),
+    mut values_of: impl FnMut(&[Level]) -> Result<Vec<f64>, PaperError>,
 ) -> Result<(GradientRow, [Image<f32>; 2]), PaperError> {
     let (mut all, mut off_border, mut inside) = (Vec::new(), Vec::new(), 0.0f64);
     let mut pictures = None;
     for seed in 0..args.seeds {
         let levels = BlockLevels::random(*blocks.layout(), u64::from(seed));
-        let values = values(backend, &plan(blocks, levels.levels(), join)?)?;
+        let values = values_of(levels.levels())?;
         let mut differences = Vec::with_capacity(values.len());
         for (i, found) in values.iter().enumerate() {
             let q = position(i as u32);
@@ -141,8 +191,8 @@ fn of_scheme(
     let mean = |d: &[f64]| d.iter().sum::<f64>() / d.len() as f64;
     let max = |d: &[f64]| d.iter().copied().fold(0.0, f64::max);
     let row = GradientRow {
-        backend: backend.describe().backend,
-        scheme: name(join),
+        backend,
+        scheme,
         mean: mean(&all),
         max: max(&all),
         mean_off_border: mean(&off_border),

@@ -3,9 +3,10 @@
 //!
 //! - `gradient`: figure 7, a rotated linear gradient at random resolutions. `weights`: figures 4 and 5, read back from backends.
 //! - `continuity`: jumps on faces, edges and corners; equal resolutions against trilinear interpolation.
+//! - `light`: a ball whose normals are known, in the light.
 //! - `accounting`: figure 9. `table`: error, time, samples and bytes at several budgets. `cost`: schemes against the nearest block.
 //! - `rank`: estimated errors of blocks against exact ones. `reselect`: after an edit of the transfer function. `classify`: prefiltered
-//!   classification. `figures`: pictures.
+//!   classification. `store`: a volume on disk, larger than its budget. `figures`: pictures.
 
 mod accounting;
 mod args;
@@ -13,12 +14,16 @@ mod classify;
 mod continuity;
 mod cost;
 mod data;
+mod error;
 mod figures;
 mod gradient;
+mod light;
 mod rank;
 mod reselect;
 mod schemes;
+mod store;
 mod table;
+mod warped;
 mod weights;
 
 pub use args::{LjungArgs, Part};
@@ -35,12 +40,14 @@ pub fn ljung(args: &LjungArgs) -> Result<Findings, PaperError> {
         Part::Gradient => gradient::run(args, rivals),
         Part::Weights => weights::run(args, rivals),
         Part::Continuity => continuity::run(args, rivals),
+        Part::Light => light::run(args, rivals),
         Part::Accounting => accounting::run(),
         Part::Table => table::run(args, rivals),
         Part::Cost => cost::run(args, rivals),
         Part::Rank => rank::run(args),
         Part::Reselect => reselect::run(args),
         Part::Classify => classify::run(args, rivals),
+        Part::Store => store::run(args, rivals),
         Part::Figures => figures::run(args, rivals),
     })
 }

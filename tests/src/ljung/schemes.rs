@@ -1,7 +1,7 @@
 //! The ways in which values between blocks come about.
 
 use brickfield::frame::Join;
-use brickfield::{BlockStyle, Classification, TransparentBlocks};
+use brickfield::{BlockStyle, TransparentBlocks};
 use brickfield_core::Interblock;
 
 /// The nearest block, then the paper's schemes.
@@ -18,5 +18,5 @@ pub(super) const fn name(join: Join) -> &'static str {
 
 /// Transparent blocks are empty, as in the paper.
 pub(super) fn style(join: Join) -> BlockStyle {
-    BlockStyle { join, transparent: TransparentBlocks::Empty, classification: Classification::OfMean }
+    BlockStyle { join, transparent: TransparentBlocks::Empty, ..BlockStyle::default() }
 }

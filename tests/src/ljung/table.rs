@@ -11,10 +11,10 @@ use serde::Serialize;
 
 use super::LjungArgs;
 use super::data::{DataSet, data_sets};
+use super::error::Error;
 use super::schemes::{joins, name, style};
 use crate::compare::rivals::Rivals;
-use crate::metrics::{delta_e, errors};
-use crate::paper::{Missed, PaperError, print};
+use crate::paper::{Missed, PaperError, mib, print};
 use crate::turns::{Contestant, Spread, take_turns};
 
 /// A line of the table.
@@ -30,14 +30,6 @@ struct TableRow {
     n_samples: u64,
     n_visible_samples: u64,
     memory: Memory,
-}
-
-/// Against the integral at full resolution.
-#[derive(Clone, Copy, Debug, Serialize)]
-struct Error {
-    rmse: f64,
-    delta_e_mean: f64,
-    delta_e_95: f64,
 }
 
 /// Bytes of a budget's blocks.
@@ -190,17 +182,7 @@ fn contest(
     })?;
     let row = |(join, (image, ms)): (Join, (Option<Image<f32>>, &Vec<f64>))| {
         let image = image.expect("every scheme has had its turn");
-        let difference = delta_e(&image, answer, [0.0; 3])?;
-        let error = Error {
-            rmse: errors(&image, answer)?.rmse,
-            delta_e_mean: difference.mean,
-            delta_e_95: difference.percentile_95,
-        };
-        Ok((join, error, Spread::of(ms)))
+        Ok((join, Error::of(&image, answer)?, Spread::of(ms)))
     };
     joins().zip(images.into_iter().zip(&ms)).map(row).collect()
-}
-
-fn mib(bytes: u64) -> f64 {
-    bytes as f64 / f64::from(1 << 20)
 }

@@ -40,6 +40,8 @@ pub enum PaperError {
     #[error(transparent)]
     Budget(#[from] brickfield::lod::BudgetError),
     #[error(transparent)]
+    Pack(#[from] brickfield::PackError),
+    #[error(transparent)]
     Fetch(#[from] brickfield::bricks::FetchError),
     #[error("{backend} cannot evaluate single functions")]
     NoFunctions { backend: &'static str },

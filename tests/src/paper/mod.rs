@@ -199,3 +199,7 @@ impl Missed {
 pub(crate) fn print(line: &str) -> Result<(), PaperError> {
     say(&format!("{line}\n")).map_err(PaperError::Print)
 }
+
+pub(crate) fn mib(bytes: u64) -> f64 {
+    bytes as f64 / f64::from(1 << 20)
+}

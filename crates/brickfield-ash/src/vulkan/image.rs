@@ -146,6 +146,7 @@ pub(super) fn extent_3d(UVec3 { x, y, z }: UVec3) -> vk::Extent3D {
 pub(crate) fn vulkan_format(format: SampleFormat) -> vk::Format {
     match format {
         SampleFormat::Unorm8 => vk::Format::R8_UNORM,
+        SampleFormat::Unorm8x4 => vk::Format::R8G8B8A8_UNORM,
         SampleFormat::Unorm16 => vk::Format::R16_UNORM,
         SampleFormat::Float32 => vk::Format::R32_SFLOAT,
     }

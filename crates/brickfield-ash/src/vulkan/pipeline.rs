@@ -133,7 +133,7 @@ impl Pipeline {
 
     fn lay_out(&mut self) -> Result<(), RenderError> {
         let stages = match self.entry {
-            Entry::Proxy => vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
+            Entry::Proxy(_) => vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
             Entry::March | Entry::Evaluate(_) | Entry::Probe(_) => vk::ShaderStageFlags::COMPUTE,
         };
         let binding = |b: &Binding| {
@@ -177,7 +177,7 @@ impl Pipeline {
             unsafe { device.raw().create_shader_module(&vk::ShaderModuleCreateInfo::default().code(spirv), None) };
         let module = module.of("vkCreateShaderModule")?;
         let made = match self.entry {
-            Entry::Proxy => self.compile_polygons(module, target),
+            Entry::Proxy(_) => self.compile_polygons(module, target),
             Entry::March | Entry::Evaluate(_) | Entry::Probe(_) => self.compile_compute(module),
         };
         // SAFETY: a pipeline does not need its module any more.

@@ -6,8 +6,8 @@ use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BrickSide, Camera, Grid, Knot, Level, Projection, TransferFunction};
 use brickfield_frame::{
     DarkRegions, Decode, Division, Drawing, FeatureSet, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join,
-    Mode, Placement, PlanParts, QuadratureRule, RayFrame, Reach, SampleFormat, Sampling, Slots, SpoiltPlan, Steps,
-    Target,
+    Mode, Placement, PlanParts, QuadratureRule, RayFrame, Reach, SampleFormat, Sampling, Slices, Slots, SpoiltPlan,
+    Steps, Target,
 };
 
 const N: u32 = 16;
@@ -32,6 +32,7 @@ fn filled(format: SampleFormat, value: impl Fn(u32, UVec3) -> u32) -> Slots {
         SampleFormat::Unorm8 => (Decode { scale: 255.0 / 16.0, offset: 0.0 }, 16),
         SampleFormat::Unorm16 => (Decode { scale: 65535.0 / 4096.0, offset: 0.0 }, 4096),
         SampleFormat::Float32 => (Decode { scale: 1.0, offset: 0.0 }, 1),
+        SampleFormat::Unorm8x4 => unreachable!("values are single numbers"),
     };
     let mut bytes = Vec::new();
     for i in 0..3 * N.pow(3) {
@@ -61,6 +62,7 @@ pub(crate) fn plan(slots: Slots, transfer: TransferFunction, rule: QuadratureRul
         domain: domain(),
         sampling,
         transfer,
+        lighting: None,
         dark: DarkRegions::default(),
         drawing: Drawing::Rays,
     };
@@ -81,6 +83,7 @@ fn parts(plan: &FramePlan) -> PlanParts {
         domain: *plan.domain(),
         sampling: *plan.sampling(),
         transfer: plan.transfer().clone(),
+        lighting: None,
         dark: DarkRegions::default(),
         drawing: Drawing::Rays,
     }
@@ -91,7 +94,7 @@ pub(crate) fn polygons(plan: &FramePlan, placement: Placement, target: Target) -
     let sampling = plan.sampling().divided(Division::Brick);
     let rays = rays(&Steps::of(&sampling, placement, Level(0)).unwrap());
     let beside_each_other = vec![UVec3::ZERO, UVec3::X];
-    let drawing = Drawing::Polygons { back_to_front: beside_each_other, target };
+    let drawing = Drawing::Polygons { back_to_front: beside_each_other, target, slices: Slices::Together };
     FramePlan::new(PlanParts { rays, sampling, drawing, ..parts(plan) }).unwrap()
 }
 

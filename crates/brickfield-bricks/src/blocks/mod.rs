@@ -1,6 +1,7 @@
 //! Flat blocks of a volume: their averages, their summaries, and sources to fetch their samples from.
 
 mod build;
+mod gradient;
 mod memory;
 mod shrink;
 mod source;
@@ -10,5 +11,7 @@ mod volume;
 
 pub use build::{BlockBuildError, BlockOptions, block_summaries, build_blocks};
 pub use memory::{BlockMemory, BlockTally, block_memory};
-pub use source::{BlockSource, FetchError, NoCompanion, NoSuchBlock, SourceId, fetch_values, greatest_spread};
+pub use source::{
+    BlockSource, FetchError, NoCompanion, NoSuchBlock, SourceId, fetch_values, greatest_gradient, greatest_spread,
+};
 pub use volume::BlockVolume;

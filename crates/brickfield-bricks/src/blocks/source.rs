@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use brickfield_core::glam::UVec3;
 use brickfield_core::{BlockLayout, BlockSummary, Companion, Grid, Level, Rescale, ScalarType, ValueRange};
 
-use super::spread::greatest_of;
+use super::{gradient, spread};
 
 /// The flat blocks of a volume, wherever their samples are kept.
 ///
@@ -70,7 +70,7 @@ impl SourceId {
 
 /// The samples of a block that could not be fetched.
 #[derive(Debug, thiserror::Error)]
-#[error("block ({}, {}, {}) of level {} cannot be fetched", block.x, block.y, block.z, level.0)]
+#[error("block ({}, {}, {}) of level {} cannot be fetched: {cause}", block.x, block.y, block.z, level.0)]
 #[allow(missing_docs)]
 pub struct FetchError {
     pub block: UVec3,
@@ -119,7 +119,12 @@ impl FetchError {
 ///
 /// No spread is greater: at most half of the values lie at each end. 0 if all blocks are constant.
 pub fn greatest_spread(source: &dyn BlockSource) -> f64 {
-    greatest_of(source.summaries())
+    spread::greatest_of(source.summaries())
+}
+
+/// The length that a [`Companion::Gradient`] of 255 stands for, in data values per world unit: the range of values in every spacing.
+pub fn greatest_gradient(source: &dyn BlockSource) -> f64 {
+    gradient::greatest_of(source.range(), source.grid())
 }
 
 /// The data values of a block's samples, x fastest.

@@ -8,7 +8,8 @@
 //! roundings of the numbers that decoding adds up.
 //!
 //! **Bound.** A segment that may have depth d' and emission e' instead of d and e changes a channel by at most
-//! T (|e' - e| + |e^-d' - e^-d|), T being the transmittance before it: the light from behind has colours of at most 1. Segments
+//! T (|e' - e| + |e^-d' - e^-d|), T being the transmittance before it: the light from behind has colours of at most 1 (in the light of a
+//! lamp: of its `brightness`). Segments
 //! change one after the other; T is taken with the least depths that the segments before may have. The sum is a bound.
 
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
@@ -16,8 +17,9 @@ use brickfield_core::{Aabb, Level, Span};
 use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, PlanRay};
 use brickfield_optics::{Segment, ValueSpread, alpha, transmittance};
 
-use super::change::{Candidates, difference, spread};
-use super::field::{FieldReader, Node};
+use super::change::{Nodes, difference, spread};
+use super::field::{FieldReader, Patch, Values};
+use super::light::{Node, brightness, shade_jump};
 use super::straying::straying;
 use super::walk::{CutSegment, clip, middle, parts, segments, whole};
 use super::{part_nodes, relative, segment};
@@ -37,6 +39,10 @@ pub(super) struct Ambiguity {
     max_extinction: f64,
     /// The coarsest level of resident blocks.
     coarsest: Level,
+    /// The greatest channel of a colour.
+    brightness: f64,
+    /// Gradients jump where the values do that they are made of.
+    shades_stray: bool,
 }
 
 impl Ambiguity {
@@ -49,6 +55,8 @@ impl Ambiguity {
             jumps: (0..knots.len() - 1).filter(jump).map(|i| knots[i].value).collect(),
             max_extinction: knots.iter().map(|k| k.extinction).fold(0.0, f64::max),
             coarsest: coarsest(field.plan()),
+            brightness: brightness(field.plan()),
+            shades_stray: field.plan().lighting().is_some() && field.jumps_between_levels(),
         }
     }
 
@@ -71,7 +79,8 @@ impl Ambiguity {
     /// The opacity that a ray near the domain's surface may have at most.
     fn grazing(&self, ray: &PlanRay, domain: &Aabb, delta: DVec3) -> f64 {
         let span = clip(ray, &grown(domain, delta), ray.t_eye);
-        span.map_or(0.0, |span| alpha(self.max_extinction * (span.end - span.start)))
+        let most = |span: Span| self.brightness * alpha(self.max_extinction * (span.end - span.start));
+        span.map_or(0.0, most)
     }
 
     fn inside(&self, field: &impl FieldReader, ray: &PlanRay, span: Span, delta: DVec3) -> f64 {
@@ -81,7 +90,7 @@ impl Ambiguity {
             Lengths::Nominal => self.appearing(field, ray, span, delta),
         };
         let nodes_stray = self.several_kinds && sampling.division() == Division::Ray;
-        let changing = match nodes_stray || !self.jumps.is_empty() {
+        let changing = match nodes_stray || !self.jumps.is_empty() || self.shades_stray {
             true => self.changing(field, ray, span, delta),
             false => 0.0,
         };
@@ -99,13 +108,17 @@ impl Ambiguity {
         let rule = plan.sampling().rule();
         for part in parts(plan, ray, span) {
             let at = |x: f64| plan.rays().center + ray.at(part.at(x));
-            if !rule.nodes().iter().any(|x| self.may_be_close(field, part, at(*x), delta)) {
-                least_depth += segment(plan, part_nodes(field, ray, part), part.length).depth;
-                continue;
-            }
-            let nodes: Vec<Candidates> =
-                rule.nodes().iter().map(|x| self.candidates(field, part, at(*x), delta)).collect();
-            let (change, least) = spread(plan, &nodes, part);
+            let jumps = |x: &f64| self.shade_jump(field, ray, (part, at(*x)), delta);
+            let shade_error = rule.nodes().iter().map(jumps).fold(0.0, f64::max);
+            let nodes: Vec<Nodes> = match rule.nodes().iter().any(|x| self.may_be_close(field, part, at(*x), delta)) {
+                true => rule.nodes().iter().map(|x| self.nodes(field, ray, (part, at(*x)), delta)).collect(),
+                false if shade_error == 0.0 => {
+                    least_depth += segment(plan, part_nodes(field, ray, part), part.length).depth;
+                    continue;
+                }
+                false => part_nodes(field, ray, part).map(|node| vec![node]).to_vec(),
+            };
+            let (change, least) = spread(plan, &nodes, part, || shade_error);
             bound += transmittance(least_depth) * change;
             least_depth += least;
         }
@@ -124,7 +137,7 @@ impl Ambiguity {
             let segment = |s| {
                 let part = whole(s, nominal, cell);
                 let seen = segment(plan, part_nodes(field, ray, part), part.length);
-                difference(&seen, &Segment::default())
+                difference(plan, &seen, &Segment::default())
             };
             doubtful.map(segment).sum::<f64>()
         };
@@ -143,64 +156,78 @@ impl Ambiguity {
         !self.jumps.is_empty() || at_face()
     }
 
-    /// What a node of `part` at `q` may be.
-    fn candidates(&self, field: &impl FieldReader, part: CutSegment, q: DVec3, delta: DVec3) -> Candidates {
-        let q = field.clamped(q);
-        let own = part.cell.unwrap_or_else(|| field.cell_at(q));
-        let mut candidates = vec![field.node(&field.patch_of(own), q)];
-        self.beyond_jumps(field, own, q, delta, &mut candidates);
-        if !self.several_kinds || part.cell.is_some() {
-            return candidates;
+    /// How much a node's shade may change where its gradient jumps.
+    fn shade_jump(&self, field: &impl FieldReader, ray: &PlanRay, (part, p): (CutSegment, DVec3), delta: DVec3) -> f64 {
+        if !self.shades_stray {
+            return 0.0;
         }
-        let kind = |c: UVec3| Kind::of(field, c);
-        let (low, high) = (field.cell_at(q - delta), field.cell_at(q + delta));
-        for cell in cells(low, high).filter(|c| kind(*c) != kind(own)) {
-            candidates.push(field.node(&field.patch_of(cell), q));
-            self.beyond_jumps(field, cell, q, delta, &mut candidates);
-        }
-        candidates
+        let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(p)));
+        if patch.is_empty() { 0.0 } else { shade_jump(field, &patch, p, ray, delta) }
     }
 
-    /// Adds both sides of the jumps that the value in `cell` is close to, and of values around it, with a jump among them, what rounding
-    /// makes of them.
-    fn beyond_jumps(&self, field: &impl FieldReader, cell: UVec3, q: DVec3, delta: DVec3, candidates: &mut Candidates) {
-        if self.jumps.is_empty() {
-            return;
+    /// What a node of `part` at `p` may be.
+    fn nodes(&self, field: &impl FieldReader, ray: &PlanRay, (part, p): (CutSegment, DVec3), delta: DVec3) -> Nodes {
+        let q = field.clamped(p);
+        let own = part.cell.unwrap_or_else(|| field.cell_at(q));
+        let mut nodes = Vec::new();
+        let mut add = |cell| {
+            let patch = field.patch_of(cell);
+            let node = Node::at(field, &patch, p, ray);
+            nodes.push(node);
+            if let Some(node) = node {
+                let beyond = self.beyond_jumps(field, &patch, q, (delta, node.values));
+                nodes.extend(beyond.into_iter().map(|values| Some(Node { values, ..node })));
+            }
+        };
+        add(own);
+        if self.several_kinds && part.cell.is_none() {
+            let kind = |c: UVec3| Kind::of(field, c);
+            let (low, high) = (field.cell_at(q - delta), field.cell_at(q + delta));
+            cells(low, high).filter(|c| kind(*c) != kind(own)).for_each(add);
         }
-        let patch = field.patch_of(cell);
-        let (Some(around), Some(node)) = (field.around(&patch, q), field.node(&patch, q)) else { return };
+        nodes
+    }
+
+    /// Both sides of the jumps that a value at `q` is close to; of many values with a jump among them, what rounding makes of them.
+    fn beyond_jumps(
+        &self,
+        field: &impl FieldReader,
+        patch: &Patch,
+        q: DVec3,
+        (delta, values): (DVec3, Values),
+    ) -> Vec<Values> {
+        if self.jumps.is_empty() {
+            return Vec::new();
+        }
+        let Some(around) = field.around(patch, q) else { return Vec::new() };
         let (gain, (min, max)) = (field.gain(), around.range);
         let offset = field.slots().decode().offset;
         let magnitude = gain * min.abs().max(max.abs()) + offset.abs() + self.jumps[0].abs();
-        let of_spread = field.spreads().map_or(0.0, |spreads| spreads.gain() * spreads.moved(&patch, q, delta));
-        let reach = gain * field.moved(&patch, q, delta) + of_spread + ROUNDING * magnitude;
-        for jump in &self.jumps {
-            match node {
-                Node::Value(value) if (value - jump).abs() <= reach => {
-                    candidates.extend([jump.next_down(), *jump].map(|value| Some(Node::Value(value))));
-                }
-                Node::Value(_) => {}
-                Node::Values(values) => candidates.extend(beyond_jump(*jump, &values, reach)),
-            }
-        }
+        let of_spread = field.spreads().map_or(0.0, |spreads| spreads.gain() * spreads.moved(patch, q, delta));
+        let reach = gain * field.moved(patch, q, delta) + of_spread + ROUNDING * magnitude;
+        let beyond = |jump: &f64| match values {
+            Values::One(value) if (value - jump).abs() <= reach => [jump.next_down(), *jump].map(Values::One).to_vec(),
+            Values::One(_) => Vec::new(),
+            Values::Many(values) => beyond_jump(*jump, &values, reach),
+        };
+        self.jumps.iter().flat_map(beyond).collect()
     }
 }
 
 /// What rounding by at most `reach` may make of values around a jump; nothing if it lies beyond them.
-fn beyond_jump(jump: f64, values: &ValueSpread, reach: f64) -> Candidates {
+fn beyond_jump(jump: f64, values: &ValueSpread, reach: f64) -> Vec<Values> {
     let [below, above] = values.reach();
     let (mean, deviation) = (values.mean, values.deviation);
     if jump < mean - below - 2.0 * reach || jump > mean + above + 2.0 * reach {
         return Vec::new();
     }
-    let of =
-        |mean: f64, deviation: f64| Some(Node::Values(ValueSpread { mean, deviation: deviation.max(0.0), ..*values }));
+    let of = |mean: f64, deviation: f64| Values::Many(ValueSpread { mean, deviation: deviation.max(0.0), ..*values });
     let moved = [mean - reach, mean + reach].into_iter();
-    let mut candidates: Candidates =
+    let mut candidates: Vec<Values> =
         moved.flat_map(|mean| [of(mean, deviation - reach), of(mean, deviation + reach)]).collect();
     // Most of them may be as near to the mean as the jump is.
     if (mean - jump).abs() <= reach && below.min(above) <= 2.0 * reach {
-        candidates.extend([jump.next_down(), jump].map(|value| Some(Node::Value(value))));
+        candidates.extend([jump.next_down(), jump].map(Values::One));
     }
     candidates
 }
@@ -246,7 +273,8 @@ fn has_several_kinds(field: &impl FieldReader) -> bool {
     kinds.any(|k| Some(k) != first)
 }
 
-fn cells(low: UVec3, high: UVec3) -> impl Iterator<Item = UVec3> {
+/// The index cells of a box, both corners included.
+pub(super) fn cells(low: UVec3, high: UVec3) -> impl Iterator<Item = UVec3> {
     let rows = move |z| (low.y..=high.y).map(move |y| (y, z));
     (low.z..=high.z).flat_map(rows).flat_map(move |(y, z)| (low.x..=high.x).map(move |x| UVec3::new(x, y, z)))
 }

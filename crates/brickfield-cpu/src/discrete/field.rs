@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Interblock, Place, ValueRange};
 use brickfield_frame::{BlockPlaces, BlockRanges, FramePlan, IndexEntry, Join, Places, SampleFormat, Slots};
-use brickfield_interp::interpolate;
+use brickfield_interp::{Neighbourhood, interpolate};
 use brickfield_optics::ValueSpread;
 
 /// How a sample is read from a slot's bytes.
@@ -52,6 +52,7 @@ pub(super) fn with_field<W: Work>(plan: &FramePlan, work: W) -> W::Output {
         SampleFormat::Unorm8 => with_join::<Unorm8, W>(plan, work),
         SampleFormat::Unorm16 => with_join::<Unorm16, W>(plan, work),
         SampleFormat::Float32 => with_join::<Float32, W>(plan, work),
+        SampleFormat::Unorm8x4 => unreachable!("values are single numbers"),
     }
 }
 
@@ -93,9 +94,22 @@ pub(super) trait FieldReader: Sync {
     #[inline]
     fn patch_of(&self, cell: UVec3) -> Patch {
         let field = self.plan().field();
-        let IndexEntry::Resident { slot, .. } = field.index().at(cell) else { return Patch { slot: None } };
-        Patch { slot: field.place_at(cell).map(|place| (slot, place)) }
+        let IndexEntry::Resident { slot, .. } = field.index().at(cell) else { return Patch { cell, slot: None } };
+        Patch { cell, slot: field.place_at(cell).map(|place| (slot, place)) }
     }
+
+    /// The patch around an index cell, as gradients ask for it: flat blocks have values even where the index has them as empty.
+    fn lit_patch_of(&self, cell: UVec3) -> Patch {
+        match self.plan().field().slots().places() {
+            Places::Blocks(places) => {
+                Patch { cell, slot: Some((places.layout().ordinal(cell) as u32, places.place(cell))) }
+            }
+            _ => self.patch_of(cell),
+        }
+    }
+
+    /// How many samples of level 0 two neighbouring samples of a patch are apart, at a clamped position of it.
+    fn spacing(&self, patch: &Patch, q: DVec3) -> f64;
 
     /// The stored number that a patch has at a clamped position; `None` if it is empty.
     fn stored(&self, patch: &Patch, q: DVec3) -> Option<f64>;
@@ -105,6 +119,10 @@ pub(super) trait FieldReader: Sync {
 
     /// How far the stored number may move if the position is off by `delta`; 0 if the patch is empty.
     fn moved(&self, patch: &Patch, q: DVec3, delta: DVec3) -> f64;
+
+    /// The stored gradient at a clamped position of a patch that is not empty: its four numbers, 0 to 1, and for each the widest range of
+    /// those that are interpolated in one block.
+    fn codes(&self, patch: &Patch, q: DVec3) -> [Code; 4];
 
     /// Whether the field jumps where two resident blocks of different levels meet.
     fn jumps_between_levels(&self) -> bool;
@@ -131,17 +149,10 @@ pub(super) trait FieldReader: Sync {
     /// A number at a clamped position of a patch by the numbers of flat blocks, weighted as their values are; `None` if the patch is empty.
     fn of_blocks(&self, patch: &Patch, q: DVec3, number: &dyn Fn(usize) -> f64) -> Option<f64>;
 
-    /// The values around a node at a clamped position of a patch; `None` if the patch is empty.
+    /// What a node at a clamped position of a patch is classified by; `None` if the patch is empty.
     #[inline]
-    fn node(&self, patch: &Patch, q: DVec3) -> Option<Node> {
-        Some(Node::Value(self.value(patch, q)?))
-    }
-
-    /// The same at a sample position.
-    #[inline]
-    fn node_at(&self, q: DVec3) -> Option<Node> {
-        let q = self.clamped(q);
-        self.node(&self.patch_of(self.cell_at(q)), q)
+    fn values(&self, patch: &Patch, q: DVec3) -> Option<Values> {
+        Some(Values::One(self.value(patch, q)?))
     }
 
     /// Data values between two stored numbers, without sign.
@@ -154,25 +165,34 @@ pub(super) trait FieldReader: Sync {
 /// A part of a field with one way to fetch its values.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Patch {
+    /// An index cell of its block.
+    pub(super) cell: UVec3,
     /// Its slot and where that one's samples lie; `None` if nothing is visible there.
     slot: Option<(u32, Place)>,
 }
 
-/// What a node is classified by.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Node {
-    /// The data value.
-    Value(f64),
-    /// The data values that the node stands for.
-    Values(ValueSpread),
+impl Patch {
+    /// Whether nothing is visible there.
+    pub(super) fn is_empty(&self) -> bool {
+        self.slot.is_none()
+    }
 }
 
-impl Node {
+/// What a node is classified by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Values {
+    /// The data value.
+    One(f64),
+    /// The data values that the node stands for.
+    Many(ValueSpread),
+}
+
+impl Values {
     /// The data value, or the mean of several.
     pub(super) fn value(self) -> f64 {
         match self {
-            Node::Value(value) => value,
-            Node::Values(values) => values.mean,
+            Values::One(value) => value,
+            Values::Many(values) => values.mean,
         }
     }
 }
@@ -183,6 +203,13 @@ pub(super) struct Around {
     /// Least and greatest of them.
     pub(super) range: (f64, f64),
     /// The widest range of those that are interpolated in one block.
+    pub(super) widest: f64,
+}
+
+/// One of the numbers of a stored gradient.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Code {
+    pub(super) value: f64,
     pub(super) widest: f64,
 }
 
@@ -212,20 +239,38 @@ impl<S: Stored> Shared<'_, S> {
     /// The samples of a slot around a clamped position.
     #[inline]
     fn cell(&self, slot: u32, place: &Place, q: DVec3) -> Option<Cell> {
-        let Some(samples) = self.slots.samples(slot) else {
-            return Some(Cell { samples: [self.slots.one_sample(slot)?; 8], fraction: DVec3::ZERO });
-        };
-        let last = place.n_in_space() - 1;
-        let s = place.local(q).clamp(DVec3::ZERO, last.as_dvec3());
-        let i = s.as_uvec3().min(last.saturating_sub(UVec3::ONE));
-        let strides = strides(place);
-        let base: usize = (0..3).map(|axis| i[axis] as usize * strides[axis]).sum();
-        // Along an axis with a single sample there is no neighbour.
-        let next = [0, 1, 2].map(|axis| if last[axis] > 0 { strides[axis] } else { 0 });
-        let corner = |c: usize| (c & 1) * next[0] + (c >> 1 & 1) * next[1] + (c >> 2) * next[2];
-        let samples = std::array::from_fn(|c| S::read(samples.bytes(), base + corner(c)));
-        Some(Cell { samples, fraction: s - i.as_dvec3() })
+        match self.slots.samples(slot) {
+            Some(samples) => Some(cell_of(place, q, |i| S::read(samples.bytes(), i))),
+            None => Some(Cell { samples: [self.slots.one_sample(slot)?; 8], fraction: DVec3::ZERO }),
+        }
     }
+
+    /// The numbers `channel` of a slot's stored gradients around a clamped position.
+    fn cell_of_codes(&self, slot: u32, place: &Place, q: DVec3, channel: usize) -> Cell {
+        let slots = self.plan.gradients().expect("a plan with stored normals has gradients");
+        match slots.samples(slot) {
+            Some(samples) => cell_of(place, q, |i| f64::from(samples.bytes()[4 * i + channel]) / 255.0),
+            None => {
+                let word = slots.one_sample(slot).expect("a flat block has a gradient") as u32;
+                let code = f64::from(word.to_le_bytes()[channel]) / 255.0;
+                Cell { samples: [code; 8], fraction: DVec3::ZERO }
+            }
+        }
+    }
+}
+
+/// The samples around a clamped position, read by number.
+#[inline]
+fn cell_of(place: &Place, q: DVec3, read: impl Fn(usize) -> f64) -> Cell {
+    let last = place.n_in_space() - 1;
+    let s = place.local(q).clamp(DVec3::ZERO, last.as_dvec3());
+    let i = s.as_uvec3().min(last.saturating_sub(UVec3::ONE));
+    let strides = strides(place);
+    let base: usize = (0..3).map(|axis| i[axis] as usize * strides[axis]).sum();
+    // Along an axis with a single sample there is no neighbour.
+    let next = [0, 1, 2].map(|axis| if last[axis] > 0 { strides[axis] } else { 0 });
+    let corner = |c: usize| (c & 1) * next[0] + (c >> 1 & 1) * next[1] + (c >> 2) * next[2];
+    Cell { samples: std::array::from_fn(|c| read(base + corner(c))), fraction: s - i.as_dvec3() }
 }
 
 impl<S: Stored> FieldReader for Shared<'_, S> {
@@ -251,6 +296,11 @@ impl<S: Stored> FieldReader for Shared<'_, S> {
         Some(Around { range, widest: range.1 - range.0 })
     }
 
+    fn codes(&self, patch: &Patch, q: DVec3) -> [Code; 4] {
+        let (slot, place) = patch.slot.expect("a patch that is not empty");
+        std::array::from_fn(|channel| Code::of(&self.cell_of_codes(slot, &place, q, channel)))
+    }
+
     /// By the slope between samples.
     fn moved(&self, patch: &Patch, q: DVec3, delta: DVec3) -> f64 {
         let (Some((_, place)), Some(around)) = (patch.slot, self.around(patch, q)) else { return 0.0 };
@@ -261,6 +311,10 @@ impl<S: Stored> FieldReader for Shared<'_, S> {
 
     fn jumps_between_levels(&self) -> bool {
         true
+    }
+
+    fn spacing(&self, patch: &Patch, _: DVec3) -> f64 {
+        patch.slot.map_or(1.0, |(_, place)| f64::from(place.level.stride()))
     }
 
     fn of_blocks(&self, patch: &Patch, _: DVec3, number: &dyn Fn(usize) -> f64) -> Option<f64> {
@@ -315,6 +369,21 @@ impl<S: Stored> FieldReader for Blended<'_, S> {
         Some(around)
     }
 
+    fn codes(&self, _: &Patch, q: DVec3) -> [Code; 4] {
+        let level = |block| self.places.row(block).level;
+        std::array::from_fn(|channel| {
+            let mut widest = 0.0f64;
+            let fetch = |block| {
+                let slot = self.places.layout().ordinal(block) as u32;
+                let code = Code::of(&self.shared.cell_of_codes(slot, &self.places.place(block), q, channel));
+                widest = widest.max(code.widest);
+                code.value
+            };
+            let value = interpolate(self.places.layout(), self.scheme, q.to_array(), level, fetch);
+            Code { value, widest }
+        })
+    }
+
     /// By looking: weights and samples change.
     fn moved(&self, patch: &Patch, q: DVec3, delta: DVec3) -> f64 {
         let Some(here) = self.stored(patch, q) else { return 0.0 };
@@ -334,6 +403,22 @@ impl<S: Stored> FieldReader for Blended<'_, S> {
         let level = |block| self.places.row(block).level;
         let fetch = |block| number(self.places.layout().ordinal(block));
         Some(interpolate(self.places.layout(), self.scheme, q.to_array(), level, fetch))
+    }
+
+    /// The mean over the eight blocks, by their weights: as continuous as the field.
+    fn spacing(&self, _: &Patch, q: DVec3) -> f64 {
+        let around = Neighbourhood::around(self.places.layout(), q.to_array());
+        let level = |block| self.places.row(block).level;
+        let weights = around.weights(self.places.layout(), self.scheme, level).into_iter().enumerate();
+        let stride = |b| around.block(b).map_or(0.0, |block| f64::from(level(block).stride()));
+        weights.map(|(b, weight)| weight * stride(b)).sum()
+    }
+}
+
+impl Code {
+    fn of(cell: &Cell) -> Code {
+        let (min, max) = cell.range();
+        Code { value: trilinear(cell), widest: max - min }
     }
 }
 
@@ -360,6 +445,10 @@ impl<V: FieldReader, S: FieldReader> FieldReader for Spread<'_, V, S> {
         Some(&self.spreads)
     }
 
+    fn spacing(&self, patch: &Patch, q: DVec3) -> f64 {
+        self.values.spacing(patch, q)
+    }
+
     #[inline]
     fn stored(&self, patch: &Patch, q: DVec3) -> Option<f64> {
         self.values.stored(patch, q)
@@ -373,6 +462,10 @@ impl<V: FieldReader, S: FieldReader> FieldReader for Spread<'_, V, S> {
         self.values.moved(patch, q, delta)
     }
 
+    fn codes(&self, patch: &Patch, q: DVec3) -> [Code; 4] {
+        self.values.codes(patch, q)
+    }
+
     fn jumps_between_levels(&self) -> bool {
         self.values.jumps_between_levels()
     }
@@ -381,14 +474,14 @@ impl<V: FieldReader, S: FieldReader> FieldReader for Spread<'_, V, S> {
         self.values.of_blocks(patch, q, number)
     }
 
-    fn node(&self, patch: &Patch, q: DVec3) -> Option<Node> {
+    fn values(&self, patch: &Patch, q: DVec3) -> Option<Values> {
         let (mean, deviation) = (self.values.value(patch, q)?, self.spreads.value(patch, q)?);
         let (format, decode) = (self.slots().format(), self.slots().decode());
         let value = |read: f32| decode.value(format.stored(read) / format.unit());
         let [a, b] = [0, 1].map(|end| self.of_blocks(patch, q, &|block| value(self.ranges.reads()[block][end])));
         // Of numbers that fall as values rise, the least stands for the greatest.
         let range = ValueRange { min: a?.min(b?), max: a?.max(b?) };
-        Some(Node::Values(ValueSpread { mean, deviation, range }))
+        Some(Values::Many(ValueSpread { mean, deviation, range }))
     }
 }
 

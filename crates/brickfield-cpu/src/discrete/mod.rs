@@ -6,6 +6,7 @@
 mod ambiguity;
 mod change;
 mod field;
+mod light;
 mod rounding;
 mod straying;
 mod walk;
@@ -17,7 +18,8 @@ use brickfield_optics::{QuadratureRule, RayState, Segment, expected_optics};
 use rayon::prelude::*;
 
 use ambiguity::Ambiguity;
-use field::{FieldReader, Node, Work, with_field};
+use field::{FieldReader, Values, Work, with_field};
+use light::Node;
 pub use rounding::{filter_rounding, position_rounding};
 use walk::{CutSegment, clip, parts};
 
@@ -27,7 +29,8 @@ pub struct Discrete {
     /// Linear, premultiplied RGBA.
     pub image: Image<f64>,
     /// For each pixel, rows from the top: the most by which any of its channels changes when nodes within f32 rounding of
-    /// a face between blocks of different level, or of a jump of the transfer function, fall on the other side; when a ray
+    /// a face between blocks of different level, or of a jump of the transfer function, fall on the other side; when one of the values does
+    /// that a node's gradient is made of; when a ray
     /// along a face of a block runs on its other side; when it takes the other of two stacks of planes, or one more or less middle of
     /// nominal length; 0 for pixels without any of these.
     ///
@@ -123,39 +126,47 @@ fn greatest_difference(a: &[f64; 4], b: &[f64; 4]) -> f64 {
     a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
 }
 
-/// The nodes of a segment.
+/// The nodes of a segment, `None` in empty blocks (and for the second node of a rule that has one). A segment without depth is as
+/// without light.
 fn part_nodes(field: &impl FieldReader, ray: &PlanRay, part: CutSegment) -> [Option<Node>; 2] {
-    rule_nodes(field.plan().sampling().rule(), |x| {
-        let q = field.plan().rays().center + ray.at(part.at(x));
-        match part.cell {
-            Some(cell) => field.node(&field.patch_of(cell), field.clamped(q)),
-            None => field.node_at(q),
-        }
+    let (plan, rule) = (field.plan(), field.plan().sampling().rule());
+    let position = |x: f64| plan.rays().center + ray.at(part.at(x));
+    let nodes = at_nodes(rule, |x| {
+        let q = field.clamped(position(x));
+        let cell = part.cell.unwrap_or_else(|| field.cell_at(q));
+        field.values(&field.patch_of(cell), q).map(Node::unlit)
+    });
+    if plan.lighting().is_none() || segment(plan, nodes, part.length).depth == 0.0 {
+        return nodes;
+    }
+    at_nodes(rule, |x| {
+        let p = position(x);
+        let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(p)));
+        Node::at(field, &patch, p, ray)
     })
 }
 
-/// A rule's nodes, `None` in empty blocks (and for the second node of a rule that has one).
-fn rule_nodes(rule: QuadratureRule, at: impl Fn(f64) -> Option<Node>) -> [Option<Node>; 2] {
+fn at_nodes(rule: QuadratureRule, at: impl Fn(f64) -> Option<Node>) -> [Option<Node>; 2] {
     let nodes = rule.nodes();
     [at(nodes[0]), nodes.get(1).and_then(|x| at(*x))]
 }
 
-/// The optics of a node (ARCHITECTURE.md, rule 5).
+/// The optics of a node, in its light (ARCHITECTURE.md, rules 5 and 9).
 fn optics(plan: &FramePlan, node: Node) -> Optics {
-    match node {
-        Node::Value(value) => plan.transfer().at(value),
-        Node::Values(values) => expected_optics(plan.transfer(), &values),
-    }
+    node.shade.on(match node.values {
+        Values::One(value) => plan.transfer().at(value),
+        Values::Many(values) => expected_optics(plan.transfer(), &values),
+    })
 }
 
-/// A segment with the given nodes; `None`: extinction 0.
+/// A segment of some nodes; `None`: extinction 0.
 fn segment(plan: &FramePlan, nodes: [Option<Node>; 2], length_world: f64) -> Segment {
     let rule = plan.sampling().rule();
     let of = |rule: QuadratureRule, nodes: &[Optics], length: f64| rule.segment_of(nodes, length).unwrap_or_default();
     match (nodes, rule) {
         ([None, None], _) => Segment::default(),
         ([Some(a), Some(b)], QuadratureRule::PreIntegrated) => {
-            rule.segment(plan.transfer(), &[a.value(), b.value()], length_world)
+            rule.lit_segment(plan.transfer(), &[a.lit(), b.lit()], length_world)
         }
         (_, QuadratureRule::PreIntegrated) => Segment::default(),
         ([Some(a), Some(b)], _) => of(rule, &[optics(plan, a), optics(plan, b)], length_world),

@@ -12,6 +12,9 @@
 //! **Codes.** Texture units may filter 8-bit texels in 8-bit arithmetic (llvmpipe does): each of the three steps of
 //! interpolation then rounds to the nearest code: at most [`CODES`] codes in all, for any R.
 //!
+//! **Light.** A node's shade is as far off as its gradient is: each of the six values that this is made of may move as the node's own
+//! does, and has a rounding of its own besides.
+//!
 //! **Pixel.** A node whose value may lie anywhere in v +- dv may have any extinction and colour that the transfer function has
 //! there: this is where its slope enters, exactly and on both sides of knots and jumps. A segment changes the pixel by at most
 //! T (|e' - e| + |e^-d' - e^-d|), T being the greatest transmittance that the segments before it may leave. The sum along the ray
@@ -19,19 +22,24 @@
 
 use brickfield_core::TransferFunction;
 use brickfield_core::glam::{DVec3, UVec2};
-use brickfield_frame::{FramePlan, SampleFormat};
+use brickfield_frame::{FramePlan, PlanRay, SampleFormat};
 use brickfield_optics::{ValueSpread, transmittance};
 use rayon::prelude::*;
 
-use super::change::{Candidates, spread};
-use super::field::{FieldReader, Node, Patch, Work, with_field};
-use super::relative;
+use super::change::{Nodes, spread};
+use super::field::{Code, FieldReader, Patch, Values, Work, with_field};
+use super::light::{Beside, Node, ValueError, shade_error};
 use super::walk::{CutSegment, clip, parts};
+use super::{part_nodes, relative};
 
 /// Roundings that `RayFrame::rounding` reckons with at worst; here one of them.
 const AT_WORST: f64 = 8.0;
 /// Rounding of an 8-bit filter: three steps, half a code each.
 const CODES: f64 = 1.5;
+/// Roundings of a value between samples: of numbers of the value scale, which are below 4.
+const OF_VALUE: f64 = 4.0 / (1u32 << 24) as f64;
+/// Roundings of a number of a stored gradient, which is at most 1.
+const OF_CODE: f64 = 8.0 / (1u32 << 24) as f64;
 /// Extinction and colour are extreme at the candidates; of wide ranges their product may pass its ends by second order.
 const SECOND_ORDER: f64 = 1.05;
 
@@ -83,11 +91,20 @@ fn of_pixel(field: &impl FieldReader, at: UVec2, cause: Cause) -> f64 {
             .around(patch, q)
             .map_or(0.0, |around| filtered(reader, reader.gain() * around.widest, sub_texel_bits)),
     };
+    let code = |code: &Code| match cause {
+        Cause::Positions => 0.0,
+        Cause::Filter { sub_texel_bits } => filtered_code(code, sub_texel_bits),
+    };
     let (mut bound, mut least_depth) = (0.0, 0.0);
     for part in parts(plan, ray, span) {
-        let candidates = |x: &f64| candidates_at(field, part, plan.rays().center + ray.at(part.at(*x)), stray);
-        let nodes: Vec<Candidates> = plan.sampling().rule().nodes().iter().map(candidates).collect();
-        let (change, least) = spread(plan, &nodes, part);
+        let position = |x: &f64| plan.rays().center + ray.at(part.at(*x));
+        let own = part_nodes(field, ray, part);
+        let rule = plan.sampling().rule();
+        let of = |(x, own): (&f64, Option<Node>)| nodes(field, (part, own), position(x), stray);
+        let nodes: Vec<Nodes> = rule.nodes().iter().zip(own).map(of).collect();
+        let shade = |x: &f64| shade_off(field, ray, (part, position(x)), delta, stray, code);
+        let shade_error = || rule.nodes().iter().map(shade).fold(0.0, f64::max);
+        let (change, least) = spread(plan, &nodes, part, shade_error);
         bound += transmittance(least_depth) * change;
         least_depth += least;
     }
@@ -103,28 +120,55 @@ fn filtered(field: &dyn FieldReader, range: f64, bits: u32) -> f64 {
     (weights + code).min(range + code)
 }
 
-/// What a node at `q` may be; nothing where its block is empty. `stray` says how far a number may move, in data values.
-fn candidates_at(
+/// How far filtering may move a number of a stored gradient: as it does a value of 8 bits.
+fn filtered_code(code: &Code, bits: u32) -> f64 {
+    let by_code = if bits < f32::MANTISSA_DIGITS - 1 { CODES / 255.0 } else { 0.0 };
+    (3.0 * (-f64::from(bits)).exp2() * code.widest).min(code.widest) + by_code
+}
+
+/// What a node at `p` may be; none where its block is empty. `stray` says how far a number may move, in data values.
+fn nodes(
     field: &impl FieldReader,
-    part: CutSegment,
-    q: DVec3,
+    (part, own): (CutSegment, Option<Node>),
+    p: DVec3,
     stray: impl Fn(&dyn FieldReader, &Patch, DVec3) -> f64,
-) -> Candidates {
-    let q = field.clamped(q);
+) -> Nodes {
+    let q = field.clamped(p);
     let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(q)));
-    let Some(node) = field.node(&patch, q) else { return vec![None] };
-    let means = extremes(field.plan().transfer(), node.value(), stray(field, &patch, q));
-    match (node, field.spreads()) {
-        (Node::Values(values), Some(spreads)) => {
+    let Some(node) = own else { return vec![None] };
+    let means = extremes(field.plan().transfer(), node.values.value(), stray(field, &patch, q));
+    let values: Vec<Values> = match (node.values, field.spreads()) {
+        (Values::Many(values), Some(spreads)) => {
             let off = stray(spreads, &patch, q);
             let deviations = [0.0, -off, off].map(|off| (values.deviation + off).max(0.0));
-            let of = |mean: &f64| {
-                deviations.map(|deviation| Some(Node::Values(ValueSpread { mean: *mean, deviation, ..values })))
-            };
+            let of = |mean: &f64| deviations.map(|d| Values::Many(ValueSpread { mean: *mean, deviation: d, ..values }));
             means.iter().flat_map(of).collect()
         }
-        _ => means.into_iter().map(|value| Some(Node::Value(value))).collect(),
+        _ => means.into_iter().map(Values::One).collect(),
+    };
+    values.into_iter().map(|values| Some(Node { values, ..node })).collect()
+}
+
+/// How far the shade of a node at `p` may be off, of the factor and the highlight together; 0 without light.
+fn shade_off(
+    field: &impl FieldReader,
+    ray: &PlanRay,
+    (part, p): (CutSegment, DVec3),
+    delta: DVec3,
+    stray: impl Fn(&dyn FieldReader, &Patch, DVec3) -> f64,
+    filtered_code: impl Fn(&Code) -> f64,
+) -> f64 {
+    let Some(lighting) = field.plan().lighting() else { return 0.0 };
+    let patch = field.patch_of(part.cell.unwrap_or_else(|| field.cell_at(p)));
+    if patch.is_empty() {
+        return 0.0;
     }
+    let rounding = OF_VALUE * field.plan().value_scale().unit();
+    let error = |b: &Beside| rounding + stray(field, &b.patch, b.at);
+    let of_code = |code: &Code| OF_CODE + filtered_code(code);
+    let error = ValueError { of_value: error, of_code };
+    let off = shade_error(field, lighting, (&patch, p, ray), delta, error);
+    off.factor + off.highlight
 }
 
 /// The values at which extinction and colour are extreme: the node's own first, the ends, and both sides of knots between.

@@ -103,7 +103,7 @@ fn change_along(
         let (mut most, mut least) = (0.0f64, here.sum.depth);
         by_cut = by_cut.max(here.by_cut);
         for there in ways.iter().map(|way| light(field, ray, way, piece)) {
-            most = most.max(difference(&here.sum, &there.sum));
+            most = most.max(difference(field.plan(), &here.sum, &there.sum));
             least = least.min(there.sum.depth);
             by_cut = by_cut.max(there.by_cut);
         }
@@ -123,7 +123,7 @@ fn light(field: &impl FieldReader, ray: &PlanRay, crossings: &[Crossing], piece:
         for part in parts_in_block(field.plan(), ray, span, crossing.cell) {
             let (whole, mut halves) = (of(part), Segment::default());
             part.halves().into_iter().for_each(|half| push(&mut halves, &of(half)));
-            light.by_cut = light.by_cut.max(difference(&whole, &halves));
+            light.by_cut = light.by_cut.max(difference(field.plan(), &whole, &halves));
             push(&mut light.sum, &whole);
         }
     }

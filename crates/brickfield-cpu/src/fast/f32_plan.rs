@@ -33,7 +33,7 @@ impl Numbers {
         let gain = decode.scale / values.unit() / slots.format().unit();
         let bias = match slots.format() {
             SampleFormat::Unorm16 => slots.nearest_stored(values.origin()),
-            SampleFormat::Unorm8 | SampleFormat::Float32 => 0.0,
+            SampleFormat::Unorm8 | SampleFormat::Unorm8x4 | SampleFormat::Float32 => 0.0,
         };
         let offset = bias * gain + values.number(decode.offset);
         Numbers { gain: gain as f32, offset: offset as f32, bias: bias as f32 }

@@ -16,7 +16,7 @@ use crate::blocks::Blocks;
 
 /// The segments of a ray's span: first..end, the first and the last of them cut to the span.
 pub(super) struct Path<'a> {
-    ray: &'a PlanRay,
+    pub(super) ray: &'a PlanRay,
     span: Span,
     step: f64,
     /// The length that the light of a whole segment is computed for.
@@ -53,7 +53,7 @@ impl<'a> Path<'a> {
     }
 
     /// Near end of segment `k`, how far its far end is, and the length that its light is computed for.
-    fn segment(&self, k: i64) -> (f64, f64, f32) {
+    pub(super) fn segment(&self, k: i64) -> (f64, f64, f32) {
         let uncut = k as f64 * self.step;
         match self.lengths {
             Lengths::True => {
@@ -89,7 +89,7 @@ pub(super) fn march<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, ray: &Pla
         Division::Ray => along(plan32, &Path::new(plan.sampling(), ray, span, Level(0)), runs, &mut state),
         Division::Brick => brick_by_brick(plan32, ray, span, &mut state),
     }
-    state.rgba()
+    state.rgba(1.0)
 }
 
 fn floor(x: f64) -> i64 {

@@ -5,17 +5,18 @@ mod brick;
 mod classify;
 mod detail;
 mod f32_plan;
+mod light;
 mod march;
 mod placed;
 mod prefiltered;
 mod scalar;
-
 mod segment;
+mod single;
 
 use std::ops::Range;
 use std::time::Instant;
 
-use brickfield_core::glam::{DVec3, UVec2};
+use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickSide, Image};
 use brickfield_frame::{
     Backend, Capabilities, Description, Evaluate, Frame, FramePlan, Join, Places, PlanRay, RenderError, SampleFormat,
@@ -25,7 +26,7 @@ use brickfield_interp::Neighbourhood;
 use rayon::prelude::*;
 
 use brick::{Float32, Stored, Unorm8, Unorm16};
-use classify::Classifier;
+use classify::{Classifier, Optics32};
 use f32_plan::F32Plan;
 use placed::PlacedPlan;
 use prefiltered::{Values32, expected};
@@ -109,8 +110,29 @@ trait Renderer: Sync {
 
     fn transfer(&self) -> &Classifier;
 
-    /// The value at a sample position, as a number of the value scale; `None` where its block is empty.
-    fn value(&self, q: DVec3) -> Option<f32>;
+    /// The value that the block around an index cell has at a sample position, as a number of the value scale; `None` if it is empty.
+    fn value_in(&self, cell: UVec3, q: DVec3) -> Option<f32>;
+
+    /// Whether nodes have the optics that are [expected](Self::expected_in) of the values around them.
+    fn is_prefiltered(&self) -> bool {
+        false
+    }
+
+    /// The optics that are expected of the values around a sample position of the block around an index cell; `None` if it is empty, or
+    /// nothing is known of these values.
+    fn expected_in(&self, _cell: UVec3, _q: DVec3) -> Option<Optics32> {
+        None
+    }
+
+    /// The value that the block around an index cell has, as gradients ask for it: of some fields, empty blocks have values, too.
+    fn value_beside(&self, cell: UVec3, q: DVec3) -> Option<f32> {
+        self.value_in(cell, q)
+    }
+
+    /// The stored gradient of the block around an index cell at a sample position: its four numbers, 0 to 1. 0 where a plan has none.
+    fn codes(&self, _cell: UVec3, _q: DVec3) -> [f32; 4] {
+        [0.0; 4]
+    }
 
     /// The pixel of a ray, of which some runs of segments may see something, front to back.
     fn pixel(&self, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4];
@@ -125,13 +147,16 @@ impl<const N: usize, S: Stored> Renderer for F32Plan<'_, N, S> {
         &self.transfer
     }
 
-    fn value(&self, q: DVec3) -> Option<f32> {
-        F32Plan::value(self, q)
+    fn value_in(&self, cell: UVec3, q: DVec3) -> Option<f32> {
+        F32Plan::value_in(self, &self.block_of(cell), q)
     }
 
     #[inline(always)]
     fn pixel(&self, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
-        march::march(self, ray, runs)
+        match self.plan.lighting() {
+            None => march::march(self, ray, runs),
+            Some(_) => single::pixel(self, ray, runs),
+        }
     }
 }
 
@@ -146,6 +171,7 @@ fn dispatch<W: Work>(plan: &FramePlan, work: W) -> W::Output {
         SampleFormat::Unorm8 => dispatch_side::<Unorm8, W>(plan, work),
         SampleFormat::Unorm16 => dispatch_side::<Unorm16, W>(plan, work),
         SampleFormat::Float32 => dispatch_side::<Float32, W>(plan, work),
+        SampleFormat::Unorm8x4 => unreachable!("values are single numbers"),
     }
 }
 
@@ -242,7 +268,8 @@ fn evaluate(renderer: &impl Renderer, function: ShaderFunction, [x, y, z, w]: [f
             [s.emission[0], s.emission[1], s.emission[2], s.depth]
         }
         ShaderFunction::Sample => {
-            let value = renderer.value(DVec3::new(x.into(), y.into(), z.into()));
+            let q = DVec3::new(x.into(), y.into(), z.into());
+            let value = renderer.value_in(plan.field().cell_at(q), q);
             value.map_or([0.0; 4], |v| [values.value(v.into()) as f32, 1.0, 0.0, 0.0])
         }
         ShaderFunction::RayAnchor => {

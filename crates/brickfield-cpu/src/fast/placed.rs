@@ -1,22 +1,19 @@
-//! A plan whose slots are of several sizes, or flat blocks: each segment by itself.
+//! A plan whose slots are of several sizes, or flat blocks.
 
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Arc;
 
+use brickfield_core::Place;
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Level, Place};
-use brickfield_frame::{BlockRanges, Division, FramePlan, Join, Places, PlanRay, Slots};
+use brickfield_frame::{BlockRanges, FramePlan, Join, Places, PlanRay, Slots};
 use brickfield_interp::interpolate;
 
-use super::Renderer;
 use super::brick::{Stored, Unorm8};
 use super::classify::{Classifier, Optics32};
 use super::f32_plan::Numbers;
-use super::march::{Path, clip, nodes_of, one};
 use super::prefiltered::{Values32, expected};
-use super::segment::{Ray32, Segment32, segment_of};
-use crate::blocks::Blocks;
+use super::{Renderer, single};
 
 /// A plan whose places differ, and whose samples are stored as `S`.
 pub(super) struct PlacedPlan<'a, S> {
@@ -49,33 +46,32 @@ impl<'a, S: Stored> PlacedPlan<'a, S> {
         PlacedPlan { plan, transfer, numbers: Numbers::of(plan), spreads, stored: PhantomData }
     }
 
-    /// The value that the block around an index cell has at a sample position; `None` if it is empty.
-    fn value_in(&self, cell: UVec3, q: DVec3) -> Option<f32> {
-        let slots = self.plan.field().slots();
-        let number = |slot: u32, place: &Place, q: DVec3| number::<S>(slots, slot, place, q) - self.numbers.bias;
-        Some(self.value_of(self.number_in(cell, q, number)?))
-    }
-
-    /// The optics that are expected at a sample position of the block around an index cell; `None` if it is empty.
-    fn optics_in(&self, spreads: &Spreads, cell: UVec3, q: DVec3) -> Option<Optics32> {
+    /// The optics that are expected at a sample position of the block around an index cell, in a slot.
+    fn optics_of(&self, spreads: &Spreads, slot: u32, cell: UVec3, q: DVec3) -> Option<Optics32> {
         let format = self.plan.field().slots().format();
         let stored = |slot: u32, end: usize| format.stored(spreads.ranges.reads()[slot as usize][end]) as f32;
-        let end = |end: usize| self.number_in(cell, q, |slot, _, _| stored(slot, end) - self.numbers.bias);
-        let range = [self.value_of(end(0)?), self.value_of(end(1)?)];
-        let code = self.number_in(cell, q, |slot, place, q| number::<Unorm8>(spreads.slots, slot, place, q))?;
-        let values = Values32 { mean: self.value_in(cell, q)?, deviation: code * spreads.scale, range };
+        let end = |end: usize| self.number_of(slot, cell, q, |slot, _, _| stored(slot, end) - self.numbers.bias);
+        let range = [self.decoded(end(0)?), self.decoded(end(1)?)];
+        let code = self.number_of(slot, cell, q, |slot, place, q| number::<Unorm8>(spreads.slots, slot, place, q))?;
+        let values = Values32 { mean: self.value_of(slot, cell, q)?, deviation: code * spreads.scale, range };
         Some(expected(&self.transfer, &values))
     }
 
+    /// The value that the block around an index cell, in a slot, has at a sample position.
+    fn value_of(&self, slot: u32, cell: UVec3, q: DVec3) -> Option<f32> {
+        let slots = self.plan.field().slots();
+        let number = |slot: u32, place: &Place, q: DVec3| number::<S>(slots, slot, place, q) - self.numbers.bias;
+        Some(self.decoded(self.number_of(slot, cell, q, number)?))
+    }
+
     /// From a stored number, less the bias, to one of the value scale.
-    fn value_of(&self, number: f32) -> f32 {
+    fn decoded(&self, number: f32) -> f32 {
         number * self.numbers.gain + self.numbers.offset
     }
 
-    /// A number that the block around an index cell has at a sample position, by the numbers of slots there; `None` if it is empty.
-    fn number_in(&self, cell: UVec3, q: DVec3, number: impl Fn(u32, &Place, DVec3) -> f32) -> Option<f32> {
+    /// A number that the block around an index cell, in a slot, has at a sample position, by the numbers of slots there.
+    fn number_of(&self, slot: u32, cell: UVec3, q: DVec3, number: impl Fn(u32, &Place, DVec3) -> f32) -> Option<f32> {
         let field = self.plan.field();
-        let slot = field.index().at(cell).slot()?;
         let q = q.clamp(DVec3::ZERO, field.last_sample());
         match (field.join(), field.slots().places()) {
             (Join::Blend(scheme), Places::Blocks(places)) => {
@@ -83,17 +79,9 @@ impl<'a, S: Stored> PlacedPlan<'a, S> {
                 let fetch = |block| f64::from(number(layout.ordinal(block) as u32, &places.place(block), q));
                 Some(interpolate(layout, scheme, q.to_array(), |block| places.row(block).level, fetch) as f32)
             }
+            (_, Places::Blocks(places)) => Some(number(slot, &places.place(cell), q)),
             _ => Some(number(slot, &field.place_at(cell)?, q)),
         }
-    }
-
-    /// One segment, whose nodes lie in the blocks around the index cells that `cell` tells.
-    fn one(&self, path: &Path, k: i64, cell: impl Fn(DVec3) -> UVec3) -> Segment32 {
-        let Some(spreads) = &self.spreads else {
-            return one((self.plan, &self.transfer), path, k, |q| self.value_in(cell(q), q));
-        };
-        let (nodes, length) = nodes_of(self.plan, path, k, |q| self.optics_in(spreads, cell(q), q));
-        segment_of(self.plan.sampling().rule(), nodes, length)
     }
 }
 
@@ -114,41 +102,59 @@ impl<S: Stored> Renderer for PlacedPlan<'_, S> {
         &self.transfer
     }
 
-    fn value(&self, q: DVec3) -> Option<f32> {
-        self.value_in(self.plan.field().cell_at(q), q)
+    fn value_in(&self, cell: UVec3, q: DVec3) -> Option<f32> {
+        let slot = self.plan.field().index().at(cell).slot()?;
+        self.value_of(slot, cell, q)
+    }
+
+    fn is_prefiltered(&self) -> bool {
+        self.spreads.is_some()
+    }
+
+    fn expected_in(&self, cell: UVec3, q: DVec3) -> Option<Optics32> {
+        let slot = self.plan.field().index().at(cell).slot()?;
+        self.optics_of(self.spreads.as_ref()?, slot, cell, q)
+    }
+
+    /// Flat blocks have values even where the index has them as empty.
+    fn value_beside(&self, cell: UVec3, q: DVec3) -> Option<f32> {
+        match self.plan.field().slots().places() {
+            Places::Blocks(places) => self.value_of(places.layout().ordinal(cell) as u32, cell, q),
+            _ => self.value_in(cell, q),
+        }
+    }
+
+    fn codes(&self, cell: UVec3, q: DVec3) -> [f32; 4] {
+        let field = self.plan.field();
+        let q = q.clamp(DVec3::ZERO, field.last_sample());
+        let (Some(gradients), Places::Blocks(places)) = (self.plan.gradients(), field.slots().places()) else {
+            return [0.0; 4];
+        };
+        let layout = places.layout();
+        let of_block = |block: UVec3, channel: usize| {
+            let slot = layout.ordinal(block) as u32;
+            match gradients.samples(slot) {
+                Some(codes) => {
+                    trilinear(&places.place(block), q, |i| f32::from(codes.bytes()[4 * i + channel])) / 255.0
+                }
+                None => {
+                    let word = gradients.one_sample(slot).unwrap_or_default() as u32;
+                    f32::from(word.to_le_bytes()[channel]) / 255.0
+                }
+            }
+        };
+        std::array::from_fn(|channel| match field.join() {
+            Join::Blend(scheme) => {
+                let level = |block| places.row(block).level;
+                let fetch = |block| f64::from(of_block(block, channel));
+                interpolate(layout, scheme, q.to_array(), level, fetch) as f32
+            }
+            _ => of_block(cell, channel),
+        })
     }
 
     fn pixel(&self, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
-        let (plan, center) = (self.plan, self.plan.rays().center);
-        let domain = (plan.domain().min - center, plan.domain().max - center);
-        let Some(span) = clip(ray, domain, ray.t_eye) else { return [0.0; 4] };
-        let mut state = Ray32::default();
-        let floor = plan.sampling().transmittance_floor();
-        let has_ended = |state: &Ray32| state.transmittance < floor || state.transmittance == 0.0;
-        match plan.sampling().division() {
-            Division::Ray => {
-                let path = Path::new(plan.sampling(), ray, span, Level(0));
-                for k in runs.iter().flat_map(|run| path.first.max(run.start)..path.end.min(run.end)) {
-                    state.push(self.one(&path, k, |q| plan.field().cell_at(q)));
-                    if has_ended(&state) {
-                        break;
-                    }
-                }
-            }
-            Division::Brick => {
-                for crossing in Blocks::new(plan, ray, span).filter(|c| c.entry.slot().is_some()) {
-                    let level = plan.field().level_at(crossing.cell);
-                    let path = Path::new(plan.sampling(), ray, crossing.span, level);
-                    for k in path.first..path.end {
-                        state.push(self.one(&path, k, |_| crossing.cell));
-                    }
-                    if has_ended(&state) {
-                        break;
-                    }
-                }
-            }
-        }
-        state.rgba()
+        single::pixel(self, ray, runs)
     }
 }
 

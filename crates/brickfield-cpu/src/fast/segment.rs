@@ -3,6 +3,7 @@
 use brickfield_optics::QuadratureRule;
 
 use super::classify::{Classifier, Optics32};
+use super::light::Shade32;
 use super::scalar::{alpha, depth, exp_minus};
 
 /// Depth, opacity and emission of a segment.
@@ -38,9 +39,10 @@ impl Ray32 {
         self.transmittance *= 1.0 - f64::from(s.alpha);
     }
 
-    /// The pixel: alpha at most 1, colours at most alpha.
-    pub(super) fn rgba(&self) -> [f32; 4] {
-        self.rgba.map(|x| (x as f32).min(1.0))
+    /// The pixel: alpha at most 1, colours at most `brightest`.
+    pub(super) fn rgba(&self, brightest: f32) -> [f32; 4] {
+        let [r, g, b, a] = self.rgba.map(|x| x as f32);
+        [r.min(brightest), g.min(brightest), b.min(brightest), a.min(1.0)]
     }
 }
 
@@ -55,6 +57,22 @@ pub(super) fn segment(rule: QuadratureRule, transfer: &Classifier, values: [Opti
             exponential(transfer.at(v), length)
         }
         _ => Segment32::default(),
+    }
+}
+
+/// A segment of nodes with these values and shades (`None`: extinction 0).
+pub(super) fn lit_segment(
+    rule: QuadratureRule,
+    transfer: &Classifier,
+    nodes: [Option<(f32, Shade32)>; 2],
+    length: f32,
+) -> Segment32 {
+    match (rule, nodes) {
+        (QuadratureRule::PreIntegrated, [Some((a, near)), Some((b, far))]) => {
+            let (unlit, shade) = (preintegrated(transfer, a, b, length), near.mean(far));
+            Segment32 { emission: unlit.emission.map(|e| e * shade.factor + unlit.alpha * shade.highlight), ..unlit }
+        }
+        _ => segment_of(rule, nodes.map(|node| node.map(|(v, shade)| shade.on(transfer.at(v)))), length),
     }
 }
 

@@ -100,6 +100,7 @@ impl<'a> Setup<'a> {
             domain: volume_box.intersection(&self.clip),
             sampling,
             transfer: self.transfer.clone(),
+            lighting: None,
             dark,
             drawing: Drawing::Rays,
         }
@@ -171,6 +172,7 @@ fn brick(setup: &Setup, layout: &BrickLayout, id: BrickId, format: SampleFormat,
             SampleFormat::Unorm8 => bytes.push(stored.round() as u8),
             SampleFormat::Unorm16 => bytes.extend((stored.round() as u16).to_le_bytes()),
             SampleFormat::Float32 => bytes.extend((stored as f32).to_le_bytes()),
+            SampleFormat::Unorm8x4 => unreachable!("values are single numbers"),
         }
     }
     (bytes, setup.transfer.is_transparent(brickfield_core::ValueRange { min, max }))

@@ -270,6 +270,11 @@ impl Field {
         }
     }
 
+    /// Whether values come about between flat blocks whose samples lie apart in the texture.
+    pub fn blends_between(&self) -> bool {
+        matches!(self.join, Join::Blend(_)) && self.dense_level().is_none()
+    }
+
     /// Whether flat blocks at the volume's upper ends have a smaller extent.
     pub fn has_short_blocks(&self) -> bool {
         match self.slots.places() {

@@ -17,6 +17,9 @@ pub enum SampleFormat {
     Unorm16,
     /// 32-bit float, read as it is.
     Float32,
+    /// Four numbers of 8 bits, read as stored / 255 each: companions only ([`Slots::companions`]). Where one number is asked for, it is
+    /// the first.
+    Unorm8x4,
 }
 
 impl SampleFormat {
@@ -52,7 +55,7 @@ impl SampleFormat {
         match self {
             SampleFormat::Unorm8 => 1,
             SampleFormat::Unorm16 => 2,
-            SampleFormat::Float32 => 4,
+            SampleFormat::Float32 | SampleFormat::Unorm8x4 => 4,
         }
     }
 
@@ -60,7 +63,7 @@ impl SampleFormat {
     #[inline]
     pub const fn unit(self) -> f64 {
         match self {
-            SampleFormat::Unorm8 => 255.0,
+            SampleFormat::Unorm8 | SampleFormat::Unorm8x4 => 255.0,
             SampleFormat::Unorm16 => 65535.0,
             SampleFormat::Float32 => 1.0,
         }
@@ -70,7 +73,9 @@ impl SampleFormat {
     #[inline]
     pub fn stored(self, read: f32) -> f64 {
         match self {
-            SampleFormat::Unorm8 | SampleFormat::Unorm16 => (f64::from(read) * self.unit()).round(),
+            SampleFormat::Unorm8 | SampleFormat::Unorm8x4 | SampleFormat::Unorm16 => {
+                (f64::from(read) * self.unit()).round()
+            }
             SampleFormat::Float32 => f64::from(read),
         }
     }
@@ -80,6 +85,7 @@ impl SampleFormat {
     pub fn read(self, bytes: &[u8], i: usize) -> f64 {
         match self {
             SampleFormat::Unorm8 => f64::from(bytes[i]) / 255.0,
+            SampleFormat::Unorm8x4 => f64::from(bytes[4 * i]) / 255.0,
             SampleFormat::Unorm16 => f64::from(u16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]])) / 65535.0,
             SampleFormat::Float32 => {
                 let b = &bytes[4 * i..4 * i + 4];
@@ -174,6 +180,8 @@ pub enum SlotsError {
     OneSample { slot: usize, level: Level, is_in_row: bool, n_samples: usize },
     #[error("a texture of {texels} texels for flat blocks; a row tells {most} apart")]
     Rows { texels: UVec3, most: UVec3 },
+    #[error("values of four numbers each: only companions of values have as many")]
+    FourNumbers,
     #[error("companions of bricks: only samples of flat blocks have companions")]
     CompanionsOfBricks,
 }
@@ -182,13 +190,16 @@ impl Slots {
     /// Slots of given samples, at given places.
     ///
     /// # Errors
-    /// Samples that do not fill their place; a place that is missing, empty, or outside of its texture.
+    /// Samples of four numbers; samples that do not fill their place; a place that is missing, empty, or outside of its texture.
     pub fn new(
         format: SampleFormat,
         decode: Decode,
         places: Places,
         samples: Vec<Option<Arc<Chunk>>>,
     ) -> Result<Slots, SlotsError> {
+        if format == SampleFormat::Unorm8x4 {
+            return Err(SlotsError::FourNumbers);
+        }
         match &places {
             Places::Even(side) => {
                 let expected = side.n_samples_total() * format.n_bytes();
@@ -367,7 +378,7 @@ impl Slots {
             SampleFormat::Unorm8 | SampleFormat::Unorm16 => {
                 ((value - self.decode.offset) / self.decode.scale * unit).round().clamp(0.0, unit)
             }
-            SampleFormat::Float32 => 0.0,
+            SampleFormat::Float32 | SampleFormat::Unorm8x4 => 0.0,
         }
     }
 }

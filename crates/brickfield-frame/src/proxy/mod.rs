@@ -25,9 +25,12 @@ use surfaces::{Outline, outlines};
 /// Polygons are projected, and grown by an eighth of a pixel and by the distance that f32 may put a ray beside its pixel
 /// ([`RayFrame::rounding`](crate::RayFrame::rounding)): which fragments count is decided by the shader from the ray; rasterisers round corners to 1/256 of a
 /// pixel.
+///
+/// With [`Slices::InteriorsFirst`] each polygon comes twice.
 #[derive(Clone, Debug)]
 pub struct ProxyGeometry {
     target: Target,
+    slices: Slices,
     bricks: Vec<[u32; 4]>,
     corners: Vec<ProxyCorner>,
     indices: Vec<u32>,
@@ -46,6 +49,17 @@ pub enum Target {
     Float16,
 }
 
+/// The order in which a polygon's fragments are drawn, where flat blocks are blended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Slices {
+    /// All at once: each fragment asks for itself whether other blocks count.
+    #[default]
+    Together,
+    /// First the fragments whose samples lie among the block's own, then those between blocks (Ljung, Lundstroem and Ynnerman 2006,
+    /// section 4): the same picture.
+    InteriorsFirst,
+}
+
 /// A polygon's corner as shaders read it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -54,7 +68,7 @@ pub struct ProxyCorner {
     pub pixel: [f32; 2],
     /// The number of the surface; [`ProxyCorner::EXIT`] for a face through which rays leave the brick.
     pub surface: f32,
-    /// Place in [`ProxyGeometry::bricks`].
+    /// Place in [`ProxyGeometry::bricks`]; where polygons come twice, twice that, plus one the second time.
     pub brick: u32,
     /// The part that a ray must meet, too, for its fragment to count: the facet or stack of planes that the surface belongs to; the exit
     /// itself, twice its axis, plus one for the upper face.
@@ -104,13 +118,15 @@ impl ProxyGeometry {
     /// The polygons of a plan whose resident bricks hold the index cells `back_to_front`, one cell for each brick.
     ///
     /// Cost: 1 to 2 us a polygon on two cores; all threads of the current rayon pool are used.
-    pub(crate) fn of(plan: &FramePlan, back_to_front: &[UVec3], target: Target) -> ProxyGeometry {
+    pub(crate) fn of(plan: &FramePlan, back_to_front: &[UVec3], target: Target, slices: Slices) -> ProxyGeometry {
+        let slices = if plan.field.blends_between() { slices } else { Slices::Together };
         let projector = Projector::new(plan);
         let of_brick = |cell: &UVec3| outlines(plan, &projector, *cell);
         let outlines: Vec<Vec<Outline>> = back_to_front.par_iter().map(of_brick).collect();
         let word = |cell: UVec3| [cell.x, cell.y, cell.z, plan.field.index().at(cell).pack()];
         let mut geometry = ProxyGeometry {
             target,
+            slices,
             bricks: back_to_front.iter().map(|cell| word(*cell)).collect(),
             corners: Vec::new(),
             indices: Vec::new(),
@@ -132,9 +148,15 @@ impl ProxyGeometry {
     }
 
     fn fill(&mut self, outlines: &[Vec<Outline>], batch_fragments: f64) {
+        let n_times = match self.slices {
+            Slices::Together => 1,
+            Slices::InteriorsFirst => 2,
+        };
         let (mut batch_start, mut n_fragments) = (0, 0.0);
         for (brick, outline) in outlines.iter().enumerate().flat_map(|(i, of)| of.iter().map(move |o| (i, o))) {
-            n_fragments += self.push(brick as u32, outline);
+            let brick = n_times * brick as u32;
+            n_fragments += (brick..brick + n_times).map(|brick| self.push(brick, outline)).sum::<f64>();
+            self.n_polygons += 1;
             if n_fragments >= batch_fragments {
                 self.batches.push(batch_start..self.indices.len() as u32);
                 (batch_start, n_fragments) = (self.indices.len() as u32, 0.0);
@@ -156,7 +178,6 @@ impl ProxyGeometry {
             owner,
         }));
         self.indices.extend((1..n.saturating_sub(1)).flat_map(|i| [first, first + i, first + i + 1]));
-        self.n_polygons += 1;
         area(points)
     }
 
@@ -168,6 +189,11 @@ impl ProxyGeometry {
     /// The pixel format that the polygons are blended into.
     pub fn target(&self) -> Target {
         self.target
+    }
+
+    /// The order of a polygon's fragments.
+    pub fn slices(&self) -> Slices {
+        self.slices
     }
 
     /// The bricks from back to front: an index cell, and its word of the index.
@@ -218,6 +244,7 @@ mod tests {
         let outlines = [sides.iter().map(square).collect()];
         let mut geometry = ProxyGeometry {
             target: Target::Float32,
+            slices: Slices::Together,
             bricks: vec![[0; 4]],
             corners: Vec::new(),
             indices: Vec::new(),

@@ -29,6 +29,7 @@ impl MacrocellRanges {
         assert_eq!(bytes.len(), side.n_samples_total() * format.n_bytes(), "bytes of a brick of {side}");
         let stored = match format {
             SampleFormat::Unorm8 => StoredRanges::Unorm8(ranges(side, bytes, |[b]| b)),
+            SampleFormat::Unorm8x4 => StoredRanges::Unorm8(ranges(side, bytes, |[b, _, _, _]| b)),
             SampleFormat::Unorm16 => StoredRanges::Unorm16(ranges(side, bytes, u16::from_le_bytes)),
             SampleFormat::Float32 => StoredRanges::Float32(ranges(side, bytes, f32::from_le_bytes)),
         };

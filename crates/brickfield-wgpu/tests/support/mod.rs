@@ -96,6 +96,7 @@ impl Setup {
             domain,
             sampling: Sampling::new(self.step, self.rule, self.mode).unwrap(),
             transfer: self.transfer.clone(),
+            lighting: None,
             dark: DarkRegions::default(),
             drawing: Drawing::Rays,
         }
@@ -137,6 +138,7 @@ impl Setup {
             SampleFormat::Unorm8 => vec![(value * 255.0).round() as u8],
             SampleFormat::Unorm16 => ((value * 65535.0).round() as u16).to_le_bytes().to_vec(),
             SampleFormat::Float32 => (value as f32).to_le_bytes().to_vec(),
+            SampleFormat::Unorm8x4 => unreachable!("values are single numbers"),
         }
     }
 }

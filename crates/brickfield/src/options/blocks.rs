@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use brickfield_bricks::{BlockOptions, BlockSource, build_blocks};
+use brickfield_bricks::{BlockOptions, BlockSource, BlockVolume, build_blocks};
 use brickfield_core::{BlockSide, Companion, TransferFunction, Volume};
-use brickfield_frame::Join;
+use brickfield_frame::{Join, Slices};
 use brickfield_io::WorldFrame;
 use brickfield_lod::{
     BlockBudget, BlockErrors, BlockLevels, BlockSelection, BlockView, BudgetSize, Importance, OneSampleBlocks, Slab,
@@ -14,7 +14,11 @@ use brickfield_lod::{
 use clap::Args;
 
 use super::{InputOptions, OptionError, ViewOptions, values};
+#[cfg(feature = "formats")]
+use super::{note, progress_bar};
 use crate::{BlockStyle, Classification, Scene, TransparentBlocks};
+#[cfg(feature = "formats")]
+use crate::{StoreBlocks, StoreLimits, SummaryProgress};
 
 /// Flat blocks instead of an octree.
 #[derive(Args, Clone, Debug)]
@@ -23,7 +27,8 @@ pub struct BlockArgs {
     /// an octree of bricks (--brick, --downsampling and --lod are not for blocks)
     #[arg(long, value_name = "N", value_parser = values::block_side)]
     pub blocks: Option<BlockSide>,
-    /// Bytes that the samples of all blocks may take, in MiB
+    /// Bytes that the samples of all blocks may take, in MiB: on the host, and on the device. Of an OME-Zarr, which is read in parts, a
+    /// quarter of them is for unpacked chunks
     #[arg(long, value_name = "MIB", requires = "blocks", conflicts_with_all = ["ratio", "block_level"], value_parser = values::positive)]
     pub budget_mib: Option<f64>,
     /// The same as a ratio: 32 for a 32nd of the volume's bytes
@@ -39,6 +44,10 @@ pub struct BlockArgs {
     /// Inside of transparent blocks: empty (as in the paper) or blended (as between others)
     #[arg(long, value_name = "HOW", requires = "blocks", default_value = "empty", value_parser = values::transparent_blocks)]
     pub transparent: TransparentBlocks,
+    /// With --polygons: together, or interiors-first (each polygon twice, first among the block's own samples, then between blocks, as in
+    /// the paper: the same picture)
+    #[arg(long, value_name = "ORDER", requires_all = ["blocks", "polygons"], default_value = "together", value_parser = values::slices)]
+    pub slices: Slices,
     /// Optics of coarse samples: mean (of the average) or prefiltered (the mean of those of its voxels, by a byte more for each sample)
     #[arg(long, value_name = "HOW", requires = "blocks", default_value = "mean", value_parser = values::classification)]
     pub classify: Classification,
@@ -50,37 +59,98 @@ pub struct BlockArgs {
 /// Flat blocks that are ready to be rendered.
 pub struct BlockSubject {
     /// The blocks.
-    pub source: Box<dyn BlockSource>,
+    pub blocks: Blocks,
     /// The names of the world's axes, where they are known.
     pub frame: WorldFrame,
     /// The transfer function that was asked for.
     pub transfer: TransferFunction,
-    /// The volume, if it is in memory.
-    pub volume: Option<Arc<Volume>>,
 }
 
-impl BlockSubject {
-    /// Opens a file and cuts it into blocks; what the reader noticed is printed. Uneven slices are made even.
+/// Where flat blocks come from.
+pub enum Blocks {
+    /// A volume in memory.
+    Memory(BlockVolume),
+    /// A store, of which the chunks at the selected resolutions are read.
+    #[cfg(feature = "formats")]
+    Store(Box<StoreBlocks>),
+}
+
+impl Blocks {
+    /// The blocks as a source.
+    pub fn source(&self) -> &dyn BlockSource {
+        match self {
+            Blocks::Memory(blocks) => blocks,
+            #[cfg(feature = "formats")]
+            Blocks::Store(blocks) => blocks.as_ref(),
+        }
+    }
+
+    /// The volume, if it is in memory.
+    pub fn volume(&self) -> Option<&Volume> {
+        match self {
+            Blocks::Memory(blocks) => Some(blocks.volume()),
+            #[cfg(feature = "formats")]
+            Blocks::Store(_) => None,
+        }
+    }
+}
+
+impl BlockArgs {
+    /// Opens a file as blocks of a side; the notes of its reader are printed. An OME-Zarr stays on disk. Any other volume is read and cut;
+    /// its uneven slices are made even.
     ///
     /// # Errors
     /// What the reader, the transfer function or the builder says.
     pub fn open(
+        &self,
         path: &Path,
         input: &InputOptions,
         side: BlockSide,
         view: &ViewOptions,
     ) -> Result<BlockSubject, OptionError> {
+        #[cfg(feature = "formats")]
+        if input.raw.is_none() && brickfield_io::detect(path)? == brickfield_io::Format::OmeZarr {
+            return self.open_store(path, input, side, view);
+        }
         let (volume, frame, transfer) = input.open_to_render(path, view)?;
-        let volume = Arc::new(volume);
-        let blocks = build_blocks(Arc::clone(&volume), &BlockOptions { side, ..BlockOptions::default() })?;
-        Ok(BlockSubject { source: Box::new(blocks), frame, transfer, volume: Some(volume) })
+        let blocks = build_blocks(Arc::new(volume), &BlockOptions { side, ..BlockOptions::default() })?;
+        Ok(BlockSubject { blocks: Blocks::Memory(blocks), frame, transfer })
     }
-}
 
-impl BlockArgs {
+    #[cfg(feature = "formats")]
+    fn open_store(
+        &self,
+        path: &Path,
+        input: &InputOptions,
+        side: BlockSide,
+        view: &ViewOptions,
+    ) -> Result<BlockSubject, OptionError> {
+        let limits = StoreLimits { max_bytes: input.limits().max_bytes, ..self.store_limits() };
+        let bar = progress_bar("summing up");
+        let mut told = |p: SummaryProgress| {
+            bar.set_length(p.n_total.into());
+            bar.set_position(p.n_done.into());
+        };
+        let store = StoreBlocks::open(path, side, limits, &input.open_options(), &mut told)?;
+        bar.finish_and_clear();
+        store.facts().notes.iter().for_each(|text| note(text));
+        let transfer = view.transfer_of_store(&store)?;
+        Ok(BlockSubject { frame: store.facts().frame, transfer, blocks: Blocks::Store(Box::new(store)) })
+    }
+
+    #[cfg(feature = "formats")]
+    fn store_limits(&self) -> StoreLimits {
+        self.budget_mib.map_or(StoreLimits::default(), |mib| StoreLimits::of_budget(bytes_of(mib)))
+    }
+
     /// How blocks are drawn.
     pub fn style(&self) -> BlockStyle {
-        BlockStyle { join: self.between, transparent: self.transparent, classification: self.classify }
+        BlockStyle {
+            join: self.between,
+            transparent: self.transparent,
+            slices: self.slices,
+            classification: self.classify,
+        }
     }
 
     /// The level of each block: what the budget buys, or one for all.
@@ -88,10 +158,10 @@ impl BlockArgs {
     /// # Errors
     /// A budget that is too small; a level that blocks do not have.
     pub fn select(&self, subject: &BlockSubject, scene: &Scene) -> Result<BlockSelection, OptionError> {
-        let source = subject.source.as_ref();
+        let source = subject.blocks.source();
         let (layout, scalar) = (*source.layout(), source.scalar_type());
         let size = match (self.budget_mib, self.ratio) {
-            (Some(mib), _) => BudgetSize::Bytes((mib * f64::from(1 << 20)) as u64),
+            (Some(mib), _) => BudgetSize::Bytes(bytes_of(mib) - self.reserved_bytes(&subject.blocks)),
             (None, Some(ratio)) => BudgetSize::Ratio(ratio),
             (None, None) => {
                 let level = brickfield_core::Level(self.block_level.unwrap_or(0));
@@ -114,4 +184,17 @@ impl BlockArgs {
         let budget = BlockBudget { size, scalar, companion_bytes, one_sample: OneSampleBlocks::Free };
         Ok(select_block_levels(&layout, errors.levels(), weights.as_deref(), &budget)?)
     }
+
+    /// Bytes of the budget that are not for blocks.
+    fn reserved_bytes(&self, blocks: &Blocks) -> u64 {
+        match blocks {
+            Blocks::Memory(_) => 0,
+            #[cfg(feature = "formats")]
+            Blocks::Store(_) => self.store_limits().cache_bytes,
+        }
+    }
+}
+
+fn bytes_of(mib: f64) -> u64 {
+    (mib * f64::from(1 << 20)) as u64
 }

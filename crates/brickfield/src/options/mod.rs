@@ -1,23 +1,35 @@
 //! The options that the `brickfield` command shares with the conformance runs.
 
 mod blocks;
+mod light;
 pub mod values;
 
 use std::path::{Path, PathBuf};
 
+#[cfg(feature = "formats")]
+use brickfield_bricks::BlockSource;
 use brickfield_bricks::{BrickTree, BuildOptions, Downsampling, build_tree_observed};
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BlockSide, BrickSide, Grid, Level, LinearRgb, TransferFunction, Volume};
 use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
 use brickfield_io::{ChoiceKind, Limits, OpenError, OpenOptions, Opened, RawSpec, SliceSource, WorldFrame};
 use brickfield_lod::Criterion;
+#[cfg(feature = "formats")]
+use brickfield_optics::diagonal_world;
 use brickfield_optics::{NarrowPeak, Preset, QuadratureRule, narrow_peak};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-pub use blocks::{BlockArgs, BlockSubject};
+pub use blocks::{BlockArgs, BlockSubject, Blocks};
+pub use light::LightOptions;
 
+#[cfg(feature = "formats")]
+use crate::StoreBlocks;
 use crate::{Quality, Scene, Skipping, Technique, Viewpoint};
+
+/// Most bytes of the coarse level of a store from which a transfer function is chosen.
+#[cfg(feature = "formats")]
+const OVERVIEW_BYTES: u64 = 16 << 20;
 
 /// How a file is read.
 #[derive(Args, Clone, Debug)]
@@ -209,6 +221,8 @@ pub enum OptionError {
     NoSuchTransfer { name: String, presets: String },
     #[error("--camera: {0}")]
     Camera(#[from] brickfield_core::CameraError),
+    #[error("--light: {0}")]
+    Light(#[from] brickfield_optics::LightError),
     #[error("--clip: the box from {} to {} lies outside of the volume's {} x {} x {} voxels", clip.min, clip.max, dims.x, dims.y, dims.z)]
     ClipOutside { clip: Aabb, dims: UVec3 },
     #[error("{first} and {second} exclude each other: {reason}")]
@@ -225,6 +239,7 @@ impl OptionError {
             | OptionError::BlockLevel { .. }
             | OptionError::NoSuchTransfer { .. }
             | OptionError::Camera(_)
+            | OptionError::Light(_)
             | OptionError::ClipOutside { .. }
             | OptionError::Exclude { .. } => true,
         }
@@ -348,6 +363,19 @@ impl ViewOptions {
         Ok(match self.named_transfer()? {
             NamedTransfer::Automatic => brickfield_optics::automatic(volume),
             NamedTransfer::Preset(preset) => preset.for_volume(volume)?,
+            NamedTransfer::OfFile(transfer) => transfer,
+        })
+    }
+
+    /// The transfer function that is asked for, for a volume that stays on disk.
+    ///
+    /// # Errors
+    /// As [`transfer`](Self::transfer); a store that has no level to choose one from.
+    #[cfg(feature = "formats")]
+    fn transfer_of_store(&self, store: &StoreBlocks) -> Result<TransferFunction, OptionError> {
+        Ok(match self.named_transfer()? {
+            NamedTransfer::Automatic => brickfield_optics::automatic(&store.overview(OVERVIEW_BYTES)?),
+            NamedTransfer::Preset(preset) => preset.transfer(store.range(), diagonal_world(store.grid()))?,
             NamedTransfer::OfFile(transfer) => transfer,
         })
     }

@@ -4,10 +4,10 @@
 use brickfield_bricks::Downsampling;
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Aabb, BlockSide, BrickSide, Interblock, Level, ScalarType, WorldPos};
-use brickfield_frame::{Division, Join, Lengths, Mode, Placement, Target};
+use brickfield_frame::{Division, Join, Lengths, Mode, Placement, Slices, Target};
 use brickfield_io::{ByteOrder, RawSpec};
 use brickfield_lod::Criterion;
-use brickfield_optics::QuadratureRule;
+use brickfield_optics::{LightSource, LitSides, Normals, QuadratureRule};
 
 use super::{Background, Boxes};
 use crate::{Classification, MAX_IMAGE, Quality, TransparentBlocks};
@@ -78,6 +78,27 @@ pub fn join(text: &str) -> Result<Join, String> {
     (text == "nearest").then_some(Join::Shared).or_else(scheme).ok_or_else(|| format!("one of nearest, {names}"))
 }
 
+/// Where light comes from.
+pub fn light(text: &str) -> Result<LightSource, String> {
+    let source = match text.split_once('=') {
+        None if text == "head" => Some(LightSource::Head),
+        None => numbers::<3>(text, ',').map(|d| LightSource::Direction(d.into())),
+        Some(("place", place)) => numbers::<3>(place, ',').map(|p| LightSource::Place(p.into())),
+        Some(_) => None,
+    };
+    source.ok_or_else(|| "head, the direction X,Y,Z towards the light, or place=X,Y,Z, in the world".to_owned())
+}
+
+/// The sides of surfaces that are lit.
+pub fn lit_sides(text: &str) -> Result<LitSides, String> {
+    named(&[("lower", LitSides::Lower), ("both", LitSides::Both)], text)
+}
+
+/// Where normals come from.
+pub fn normals(text: &str) -> Result<Normals, String> {
+    named(&[("central", Normals::Central), ("stored", Normals::Stored)], text)
+}
+
 /// Draft or final.
 pub fn quality(text: &str) -> Result<Quality, String> {
     match text {
@@ -102,6 +123,15 @@ pub fn classification(text: &str) -> Result<Classification, String> {
         "mean" => Ok(Classification::OfMean),
         "prefiltered" => Ok(Classification::Prefiltered),
         _ => Err("mean or prefiltered".to_owned()),
+    }
+}
+
+/// The order of a polygon's fragments.
+pub fn slices(text: &str) -> Result<Slices, String> {
+    match text {
+        "together" => Ok(Slices::Together),
+        "interiors-first" => Ok(Slices::InteriorsFirst),
+        _ => Err("together or interiors-first".to_owned()),
     }
 }
 

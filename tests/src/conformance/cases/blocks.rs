@@ -1,6 +1,6 @@
 //! Flat blocks of any resolution next to each other, and the values between them (Ljung, Lundstroem and Ynnerman 2006).
 
-use brickfield::frame::{Division, FramePlan, Join, Mode, Placement, Places, ShaderFunction, Target};
+use brickfield::frame::{Division, FramePlan, Join, Mode, Placement, Places, ShaderFunction, Slices, Target};
 use brickfield::interp::Neighbourhood;
 use brickfield::{BlockStyle, Classification, Technique, TransparentBlocks};
 use brickfield_core::glam::{DVec3, UVec3};
@@ -25,8 +25,12 @@ pub(super) fn random(scalar: ScalarType, side: BlockSide, style: BlockStyle) -> 
     Setup::new(hills(&grid(), scalar), soft(scalar)).blocks(side, FlatLevels::Random, style)
 }
 
-pub(super) const NEAREST: BlockStyle =
-    BlockStyle { join: Join::Shared, transparent: TransparentBlocks::Empty, classification: Classification::OfMean };
+pub(super) const NEAREST: BlockStyle = BlockStyle {
+    join: Join::Shared,
+    transparent: TransparentBlocks::Empty,
+    slices: Slices::Together,
+    classification: Classification::OfMean,
+};
 
 pub(super) fn cases() -> Vec<Case> {
     [pictures(), equal(), weights()].into_iter().flatten().collect()
@@ -78,6 +82,13 @@ fn pictures() -> Vec<Case> {
         picture("blocks/polygons", catches![shader::MAXIMUM_TO_THE_FACE, PolygonsReversed], move || {
             random(u8, BlockSide::V16, blended(MaximumDistance)).with(|s| {
                 (s.division, s.placement) = (Division::Brick, Placement::ObjectPlanes);
+                s.technique = Technique::Polygons(Target::Float32);
+            })
+        }),
+        picture("blocks/interiors-first", catches![BetweenMissing, PolygonsReversed], move || {
+            let style = BlockStyle { slices: Slices::InteriorsFirst, ..blended(BoundarySplit) };
+            random(u16, BlockSide::V8, style).rule(QuadratureRule::Gauss2).with(|s| {
+                (s.division, s.placement) = (Division::Brick, Placement::ViewportPlanes);
                 s.technique = Technique::Polygons(Target::Float32);
             })
         }),

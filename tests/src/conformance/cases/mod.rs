@@ -6,6 +6,7 @@ mod fast;
 mod fields;
 mod functions;
 mod levels;
+mod light;
 mod pictures;
 mod placements;
 mod polygons;
@@ -29,6 +30,7 @@ pub fn all() -> Vec<Case> {
         fast::cases(),
         storages::cases(),
         blocks::cases(),
+        light::cases(),
         prefiltered::cases(),
         extremes::cases(),
         real::cases(),

@@ -9,7 +9,7 @@ use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{
     Aabb, BlockLayout, BlockSide, BrickSide, Camera, Level, Projection, ScalarType, TransferFunction, Volume,
 };
-use brickfield_optics::QuadratureRule;
+use brickfield_optics::{Light, LightSource, LightTerms, Normals, QuadratureRule, flat_below};
 
 use super::super::case::{Case, Check, FlatBlocks, Mutant, NoData, Oracle, PictureTest, Shows};
 use super::super::storage::Storage;
@@ -106,6 +106,25 @@ impl Setup {
             _ => OracleKind::None,
         };
         Setup { oracle, blocks: Some((side, levels, style)), ..self }
+    }
+
+    /// In the light; surfaces begin at a gradient of a 64th of the values' range in the least spacing.
+    pub(super) fn lit(self, source: LightSource, terms: LightTerms) -> Setup {
+        let flat_below = flat_below(self.volume.range(), self.volume.grid().spacing().min_element());
+        let light = Light::new(source, terms, flat_below).expect("a case's light is one");
+        self.with(|s| s.light = Some(light))
+    }
+
+    /// On normals of stored gradients, of which the volume's own samples know nothing; for flat blocks.
+    pub(super) fn stored_normals(self) -> Setup {
+        let setup = self.with(|s| s.light = s.light.map(|light| light.on_normals(Normals::Stored)));
+        Setup { oracle: OracleKind::None, ..setup }
+    }
+
+    /// Surfaces begin at another gradient.
+    pub(super) fn flat_below_times(self, factor: f64) -> Setup {
+        let scaled = |light: Light| Light::new(light.source(), light.terms(), light.flat_below() * factor);
+        self.with(|s| s.light = s.light.map(|light| scaled(light).expect("a case's light is one")))
     }
 
     pub(super) fn rule(self, rule: QuadratureRule) -> Setup {

@@ -33,7 +33,7 @@ use parts::{Kept, Parts, ShardIndex, StoredPart};
 /// finest one. Several threads may read at once. Samples that are not stored have the fill value, and are counted; in a store
 /// that [`PyramidWriter`](super::PyramidWriter) wrote they are an error.
 ///
-/// Memory: unpacked parts within a bound, the least recently used leave; for each thread that reads, one part more, twice if it is
+/// Memory: unpacked parts within a bound, the least recently used leave, the last one stays; for each thread that reads, one part more, twice if it is
 /// compressed.
 pub struct ZarrLevels {
     facts: VolumeFacts,

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 
 use brickfield::io::SAVED_EXTENSIONS;
 use brickfield::options::{
-    BlockArgs, Boxes, InputOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions, values,
+    BlockArgs, Boxes, InputOptions, LightOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions, values,
 };
 use brickfield::overlay::LEVEL_COLORS;
 use brickfield::{AdapterInfo, BackendError, BackendKind, BackendStatus, Validation, backends};
@@ -133,6 +133,8 @@ struct RenderArgs {
     view: ViewOptions,
     #[command(flatten)]
     sampling: SamplingOptions,
+    #[command(flatten)]
+    light: LightOptions,
     #[command(flatten)]
     flat: BlockArgs,
     #[arg(long, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "drawn",

@@ -3,10 +3,14 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
+#[cfg(feature = "formats")]
+use brickfield::StoreBlocks;
 use brickfield::bricks::block_memory;
 use brickfield::core::{BlockSide, BrickId, Image, Level};
 use brickfield::frame::{Backend, Frame, FramePlan, Slots};
 use brickfield::lod::{BlockLevels, select_cut};
+#[cfg(feature = "formats")]
+use brickfield::options::Blocks;
 use brickfield::options::{BlockSubject, Boxes, Subject, values};
 use brickfield::overlay::{LevelColor, show_bricks, show_bricks_faintly};
 use brickfield::{
@@ -21,12 +25,14 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     check_picture_path(&args.out).map_err(Failure::usage)?;
     args.view.check()?;
     args.sampling.check()?;
+    args.light.check()?;
     let mut backend = open(args)?;
     if let Some(side) = args.flat.blocks {
         return render_blocks(args, side, backend.as_mut());
     }
     let subject = Subject::open(&args.file, &args.input, &args.tree, &args.view)?;
     let scene = args.sampling.of(args.view.scene(&subject)?, Some(&subject.volume))?;
+    let scene = args.light.of(scene, subject.volume.range(), subject.tree.grid())?;
     let mut residency = Residency::default();
     let plan = prepare(&subject.tree, &scene, &mut residency).map_err(Failure::usage)?;
     note_if_nothing_shows(&plan);
@@ -46,26 +52,32 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
 
 /// Renders flat blocks.
 fn render_blocks(args: &RenderArgs, side: BlockSide, backend: &mut dyn Backend) -> Result<(), Failure> {
-    let subject = BlockSubject::open(&args.file, &args.input, side, &args.view)?;
-    let grid = subject.source.grid();
-    let scene = args.view.scene_of(grid, subject.frame, &subject.transfer)?;
-    let scene = args.sampling.of(scene, subject.volume.as_deref())?;
+    let subject = args.flat.open(&args.file, &args.input, side, &args.view)?;
+    let source = subject.blocks.source();
+    let scene = args.view.scene_of(source.grid(), subject.frame, &subject.transfer)?;
+    let scene = args.sampling.of(scene, subject.blocks.volume())?;
+    let scene = args.light.of(scene, source.range(), source.grid())?;
     let selection = args.flat.select(&subject, &scene)?;
     let (levels, mut residency) = (&selection.levels, BlockResidency::default());
-    let plan = prepare_blocks(subject.source.as_ref(), &scene, levels.levels(), args.flat.style(), &mut residency)?;
+    let plan = prepare_blocks(source, &scene, levels.levels(), args.flat.style(), &mut residency)?;
     note_if_nothing_shows(&plan);
     let frame = backend.render(&plan)?;
     let attributes = attributes(args, backend, &scene, &plan);
     write_picture(&args.out, &frame.image, args.view.background.0, &attributes)?;
     print(&summary(backend, &scene, &plan, &frame))?;
     print(&block_summary(&subject, levels, &residency, &plan))?;
+    #[cfg(feature = "formats")]
+    if let Blocks::Store(store) = &subject.blocks {
+        print(&store_summary(store, frame.uploaded_bytes))?;
+    }
     check_validation(&backend.validation_messages())
 }
 
 /// The blocks of each level, and their bytes.
 fn block_summary(subject: &BlockSubject, levels: &BlockLevels, residency: &BlockResidency, plan: &FramePlan) -> String {
-    let layout = subject.source.layout();
-    let memory = block_memory(layout, subject.source.scalar_type(), levels.levels());
+    let source = subject.blocks.source();
+    let layout = source.layout();
+    let memory = block_memory(layout, source.scalar_type(), levels.levels());
     let by_level: Vec<String> = layout
         .side()
         .levels()
@@ -74,11 +86,12 @@ fn block_summary(subject: &BlockSubject, levels: &BlockLevels, residency: &Block
         .map(|(level, n)| format!("{n} of level {}", level.0))
         .collect();
     let slots = plan.field().slots();
+    let of = |name: &str, slots: &Arc<Slots>| format!(", {name} {:.1} MiB", mib(slots.n_bytes() as u64));
+    let spreads = plan.spreads().map(|spreads| of("spreads", spreads)).unwrap_or_default();
+    let gradients = plan.gradients().map(|gradients| of("gradients", gradients)).unwrap_or_default();
     let free = residency.n_free_texels() * slots.format().n_bytes() as u64;
-    let of_spreads = |spreads: &Arc<Slots>| format!(" and spreads of {:.1} MiB", mib(spreads.n_bytes() as u64));
-    let spreads = plan.spreads().map(of_spreads).unwrap_or_default();
     format!(
-        "flat blocks of {}: {}; {:.1}:1\nkept {:.1} MiB{spreads}, {:.1} MiB of the texture free; with ghost layers {:.1} MiB (one side), {:.1} MiB (both)\n",
+        "flat blocks of {}: {}; {:.1}:1\nkept {:.1} MiB{spreads}{gradients}, {:.1} MiB of the texture free; with ghost layers {:.1} MiB (one side), {:.1} MiB (both)\n",
         layout.side(),
         by_level.join(", "),
         memory.ratio(),
@@ -86,6 +99,22 @@ fn block_summary(subject: &BlockSubject, levels: &BlockLevels, residency: &Block
         mib(free),
         mib(memory.larger.single_sided_bytes),
         mib(memory.larger.double_sided_bytes),
+    )
+}
+
+/// The bytes that a store was asked for, that are held beside the blocks, and that went to the device.
+#[cfg(feature = "formats")]
+fn store_summary(store: &StoreBlocks, uploaded: u64) -> String {
+    let missing = match store.n_missing_chunks() {
+        0 => String::new(),
+        n => format!("; {n} chunks are not stored, and have the fill value"),
+    };
+    format!(
+        "read {:.1} MiB of the store{missing}\nkept beside the blocks: {:.1} MiB of unpacked chunks, {:.1} MiB of summaries\nuploaded {:.1} MiB\n",
+        mib(store.n_bytes_read()),
+        mib(store.n_bytes_kept()),
+        mib(store.n_summary_bytes()),
+        mib(uploaded),
     )
 }
 

@@ -1,0 +1,89 @@
+//! Segments one by one, wherever their nodes lie: for plans whose slots differ, and for light.
+
+use std::ops::Range;
+
+use brickfield_core::Level;
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_frame::{Division, PlanRay};
+
+use super::Renderer;
+use super::classify::Optics32;
+use super::light::Lamp;
+use super::march::{self, Path, clip, nodes_of};
+use super::segment::{Ray32, Segment32, lit_segment, segment_of};
+use crate::blocks::Blocks;
+
+/// The pixel of a ray, of which some runs of segments may see something, front to back.
+pub(super) fn pixel(renderer: &impl Renderer, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
+    let (plan, center) = (renderer.plan(), renderer.plan().rays().center);
+    let domain = (plan.domain().min - center, plan.domain().max - center);
+    let Some(span) = clip(ray, domain, ray.t_eye) else { return [0.0; 4] };
+    let (mut state, lamp) = (Ray32::default(), Lamp::of(renderer));
+    let floor = plan.sampling().transmittance_floor();
+    let has_ended = |state: &Ray32| state.transmittance < floor || state.transmittance == 0.0;
+    match plan.sampling().division() {
+        Division::Ray => {
+            let path = Path::new(plan.sampling(), ray, span, Level(0));
+            for k in runs.iter().flat_map(|run| path.first.max(run.start)..path.end.min(run.end)) {
+                state.push(one(renderer, lamp.as_ref(), &path, k, |q| plan.field().cell_at(q)));
+                if has_ended(&state) {
+                    break;
+                }
+            }
+        }
+        Division::Brick => {
+            for crossing in Blocks::new(plan, ray, span).filter(|c| c.entry.slot().is_some()) {
+                let level = plan.field().level_at(crossing.cell);
+                let path = Path::new(plan.sampling(), ray, crossing.span, level);
+                for k in path.first..path.end {
+                    state.push(one(renderer, lamp.as_ref(), &path, k, |_| crossing.cell));
+                }
+                if has_ended(&state) {
+                    break;
+                }
+            }
+        }
+    }
+    state.rgba(lamp.map_or(1.0, |lamp| lamp.brightest()))
+}
+
+/// One segment; its nodes lie in the blocks around these index cells.
+fn one(renderer: &impl Renderer, lamp: Option<&Lamp>, path: &Path, k: i64, cell: impl Fn(DVec3) -> UVec3) -> Segment32 {
+    match renderer.is_prefiltered() {
+        true => of_expected(renderer, lamp, path, k, cell),
+        false => of_values(renderer, lamp, path, k, cell),
+    }
+}
+
+/// One segment by the optics that are expected at its nodes.
+fn of_expected(
+    renderer: &impl Renderer,
+    lamp: Option<&Lamp>,
+    path: &Path,
+    k: i64,
+    cell: impl Fn(DVec3) -> UVec3,
+) -> Segment32 {
+    let (plan, rule) = (renderer.plan(), renderer.plan().sampling().rule());
+    let (nodes, length) = nodes_of(plan, path, k, |q| Some((q, renderer.expected_in(cell(q), q)?)));
+    let unlit = segment_of(rule, nodes.map(|node| node.map(|(_, optics)| optics)), length);
+    let Some(lamp) = lamp.filter(|_| unlit.depth > 0.0) else { return unlit };
+    let lit = |(q, optics): (DVec3, Optics32)| lamp.shade(renderer, cell(q), q, path.ray).on(optics);
+    segment_of(rule, nodes.map(|node| node.map(lit)), length)
+}
+
+/// One segment by the values at its nodes.
+fn of_values(
+    renderer: &impl Renderer,
+    lamp: Option<&Lamp>,
+    path: &Path,
+    k: i64,
+    cell: impl Fn(DVec3) -> UVec3,
+) -> Segment32 {
+    let (plan, transfer) = (renderer.plan(), renderer.transfer());
+    let value = |q: DVec3| renderer.value_in(cell(q), q);
+    let unlit = march::one((plan, transfer), path, k, value);
+    let Some(lamp) = lamp.filter(|_| unlit.depth > 0.0) else { return unlit };
+    let lit = |q: DVec3| Some((value(q)?, lamp.shade(renderer, cell(q), q, path.ray)));
+    let (nodes, length) = nodes_of(plan, path, k, lit);
+    lit_segment(plan.sampling().rule(), transfer, nodes, length)
+}
