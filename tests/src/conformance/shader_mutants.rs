@@ -159,6 +159,8 @@ mutants! {
     ONE_SAMPLE_FORGOTTEN: "one-sample-forgotten", "field/blocks", "read_among", "counted(samples.one)" => "counted(0.0)";
     /// Values are classified by their mean alone.
     SPREADS_IGNORED: "spreads-ignored", "field/blocks", "node_at", "spread_of(read.y)" => "0.0";
+    /// Gradients are of the least values around a position, not of their mean.
+    GRADIENT_OF_THE_LEAST: "gradient-of-the-least", "field/blocks", "value_at", "node_at(area, p).x" => "node_at(area, p).z";
     /// Blocks of one sample have no spread.
     ONE_SPREADS_FORGOTTEN: "one-spreads-forgotten", "field/blocks", "read_among",
         "unpack4x8unorm(one_spreads[cell_number(cell)]).x" => "0.0";

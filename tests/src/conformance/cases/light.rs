@@ -18,9 +18,9 @@ use crate::conformance::storage::Storage;
 use crate::volumes::{fill_unit, spread};
 
 /// Every term counts; highlights are small.
-const SHINY: LightTerms = LightTerms { ambient: 0.15, diffuse: 0.7, specular: 0.5, shininess: 20 };
+pub(super) const SHINY: LightTerms = LightTerms { ambient: 0.15, diffuse: 0.7, specular: 0.5, shininess: 20 };
 /// No axis, no symmetry, and not where the eye is.
-const ASIDE: LightSource = LightSource::Direction(DVec3::new(-0.7, -0.4, 0.9));
+pub(super) const ASIDE: LightSource = LightSource::Direction(DVec3::new(-0.7, -0.4, 0.9));
 
 /// Beside a volume of this grid.
 fn beside(grid: &Grid) -> LightSource {

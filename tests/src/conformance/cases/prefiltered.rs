@@ -4,11 +4,12 @@ use brickfield::frame::{Division, FramePlan, Mode, Placement, ShaderFunction, Ta
 use brickfield::{BlockStyle, Classification, Technique};
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{BlockSide, Grid, Interblock, Level, Optics, ScalarType, ValueRange};
-use brickfield_optics::{QuadratureRule, ValueSpread, expected_optics};
+use brickfield_optics::{LightSource, QuadratureRule, ValueSpread, expected_optics};
 
 use super::blocks::{NEAREST, blended, random};
 use super::fields::{COOL, WARM, grid, hills, knot, skew_grid, soft, sparse};
 use super::functions::{function, steepness};
+use super::light::{ASIDE, SHINY};
 use super::setup::{FlatLevels, Setup, catches, picture};
 use crate::conformance::case::{Case, FunctionPoint};
 use crate::conformance::plan_mutants::PlanMutant::*;
@@ -100,6 +101,29 @@ fn pictures() -> Vec<Case> {
             let grid = Grid::axis_aligned(UVec3::new(71, 66, 53), DVec3::ONE).expect("a grid");
             Setup::new(sparse(&grid, u8), transfer).blocks(BlockSide::V8, FlatLevels::Random, maximum())
         }),
+        // The shade of the mean's gradient, on the colour that is expected.
+        picture(
+            "prefiltered/light-maximum-distance-gauss2",
+            catches![
+                shader::SPREADS_IGNORED,
+                shader::GRADIENT_OF_THE_LEAST,
+                shader::SPACING_OF_OWN_BLOCK,
+                shader::NOT_HALFWAY,
+                DiffuseDimmed,
+            ],
+            move || random(u16, BlockSide::V8, maximum()).lit(ASIDE, SHINY).rule(QuadratureRule::Gauss2),
+        ),
+        // Two companions of one sample.
+        picture(
+            "prefiltered/light-stored-nearest",
+            catches![
+                shader::ONE_SPREADS_FORGOTTEN,
+                shader::ONE_GRADIENT_FORGOTTEN,
+                shader::STORED_LENGTH_NOT_SQUARED,
+                FlatBelowScaled,
+            ],
+            move || random(u8, BlockSide::V8, prefiltered(NEAREST)).lit(LightSource::Head, SHINY).stored_normals(),
+        ),
     ]
 }
 
