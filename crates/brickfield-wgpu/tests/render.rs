@@ -93,7 +93,8 @@ fn skipping_changes_no_bit() {
 fn every_variant_renders_what_the_general_one_renders() {
     let Some(mut backend) = backend() else { return };
     let of_maps = [Feature::SkipMacrocells, Feature::SkipBesideBeams];
-    let unneeded = [Feature::HardwareFilter, Feature::EarlyTermination].into_iter().chain(of_maps);
+    let of_light = [Feature::Light, Feature::LightBesideEye, Feature::StoredGradients];
+    let unneeded = [Feature::HardwareFilter, Feature::EarlyTermination].into_iter().chain(of_maps).chain(of_light);
     let general = unneeded.fold(FeatureSet::all(), FeatureSet::without);
     for rule in QuadratureRule::ALL {
         for plan in [Setup::new(DIMS, ball, warm()), Setup { skip: true, ..Setup::new(DIMS, ball, warm()) }]

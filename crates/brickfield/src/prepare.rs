@@ -87,7 +87,7 @@ pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Re
 /// ([`select_by`](brickfield_lod::select_by)); the scene's criteria are not asked.
 ///
 /// Bricks that the selection ignores are left out, with or without [`Skipping`]: their blocks are empty, and so are
-/// the segments of [`QuadratureRule::PreIntegrated`] that end in them.
+/// the segments of [`PreIntegrated`](brickfield_optics::QuadratureRule::PreIntegrated) that end in them.
 ///
 /// # Errors
 /// As [`prepare`], and a selection of another octree.

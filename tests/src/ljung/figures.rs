@@ -1,10 +1,13 @@
-//! Pictures of each volume at 32:1: at full resolution, the nearest block, and each scheme; below, the colour difference.
+//! Pictures of each volume at 32:1, unlit and in the light: at full resolution, the nearest block, and each scheme; below, the colour
+//! difference.
 
-use brickfield::frame::Mode;
-use brickfield::lod::BudgetSize;
-use brickfield::{BlockResidency, prepare_blocks};
-use brickfield_core::Image;
-use brickfield_optics::ColorMetric;
+use brickfield::bricks::BlockSource;
+use brickfield::cpu::discrete;
+use brickfield::frame::{Backend, Join, Mode};
+use brickfield::lod::{BlockLevels, BudgetSize};
+use brickfield::{BlockResidency, Scene, prepare_blocks};
+use brickfield_core::{Image, Interblock, Level};
+use brickfield_optics::{ColorMetric, Light, LightSource, LightTerms, flat_below};
 
 use super::LjungArgs;
 use super::data::{DataSet, data_sets};
@@ -31,20 +34,38 @@ fn of_data_set(args: &LjungArgs, rivals: &mut Rivals, data: &DataSet) -> Result<
     let Some(backend) = rivals.present.last_mut() else { return Ok(()) };
     let scene = data.scene(args, Mode::Exact)?;
     let levels = data.select(BudgetSize::Ratio(32.0))?.levels;
-    let answer = answer(data, &scene);
-    let (mut pictures, mut differences) = (vec![full(&answer)], vec![Image::transparent(answer.size())]);
+    of_scene(args, backend.as_mut(), (data, &levels), &scene, &answer(data, &scene), "")?;
+    let (range, grid) = (data.blocks.range(), data.blocks.grid());
+    let steepness = flat_below(range, grid.spacing().min_element());
+    let light = Light::new(LightSource::Head, LightTerms::default(), steepness).expect("a light by default");
+    let lit = Scene { light: Some(light), ..scene };
+    let whole = BlockLevels::uniform(*data.blocks.layout(), Level(0));
+    let join = Join::Blend(Interblock::MaximumDistance);
+    let plan = prepare_blocks(&data.blocks, &lit, whole.levels(), style(join), &mut BlockResidency::default())?;
+    of_scene(args, backend.as_mut(), (data, &levels), &lit, &discrete(&plan).image, "-lit")
+}
+
+fn of_scene(
+    args: &LjungArgs,
+    backend: &mut dyn Backend,
+    (data, levels): (&DataSet, &BlockLevels),
+    scene: &Scene,
+    answer: &Image<f64>,
+    ending: &str,
+) -> Result<(), PaperError> {
+    let (mut pictures, mut differences) = (vec![full(answer)], vec![Image::transparent(answer.size())]);
     for join in joins() {
-        let plan = prepare_blocks(&data.blocks, &scene, levels.levels(), style(join), &mut BlockResidency::default())?;
+        let plan = prepare_blocks(&data.blocks, scene, levels.levels(), style(join), &mut BlockResidency::default())?;
         let name = backend.describe().backend;
         let frame = backend.render(&plan).map_err(|source| PaperError::Render { backend: name, source })?;
-        differences.push(difference(&frame.image, &answer));
+        differences.push(difference(&frame.image, answer));
         pictures.push(frame.image);
     }
     let what = format!(
         "{} at 32:1: full resolution, nearest block, minimum distance, boundary split, maximum distance; below, Delta E from 0 to {BRIGHT}",
         data.name
     );
-    let name = format!("figure8-{}", file_name(&data.name));
+    let name = format!("figure8-{}{ending}", file_name(&data.name));
     args.common.write_picture(&name, &stacked(&[beside(&pictures), beside(&differences)]), &what)
 }
 

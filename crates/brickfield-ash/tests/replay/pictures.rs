@@ -31,9 +31,10 @@ fn a_homogeneous_slab_has_its_closed_form_in_every_rule() {
     let transfer = TransferFunction::constant(0.07, [0.2, 0.4, 0.8]).unwrap();
     for rule in QuadratureRule::ALL.into_iter().filter(|r| *r != QuadratureRule::LeftRiemann) {
         let plan = plan(ramp(SampleFormat::Unorm8), transfer.clone(), rule, Mode::Exact);
-        // Nothing is dark here, and the plan has neither a map of macrocells nor beams.
+        // Nothing is dark here, and the plan has neither a map of macrocells nor beams nor light.
         let unneeded = [Feature::HardwareFilter, Feature::SkipMacrocells, Feature::SkipBesideBeams];
-        let general = unneeded.into_iter().fold(FeatureSet::all(), FeatureSet::without);
+        let of_light = [Feature::Light, Feature::LightBesideEye, Feature::StoredGradients];
+        let general = unneeded.into_iter().chain(of_light).fold(FeatureSet::all(), FeatureSet::without);
         for plan in [&plan, &with_features(&plan, general)] {
             let frame = backend.render(plan).unwrap();
             assert_close(&frame.image, layer(0.07 * 16.0, [0.2, 0.4, 0.8]), 1e-6, rule.name());
