@@ -70,6 +70,9 @@ pub struct SummaryProgress {
 }
 
 impl StoreBlocks {
+    /// Bytes of an [`overview`](Self::overview) that tells materials apart: 256^3 samples of 8 bits.
+    pub const OVERVIEW_BYTES: u64 = 16 << 20;
+
     /// Opens a store; of several images, channels and times `options` choose. The limits of `options` are not asked.
     ///
     /// A store that states no summaries is read once, 32 slices at a time, and twice if its voxels are floats; `progress` is told.

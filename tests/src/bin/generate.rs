@@ -4,10 +4,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
-use brickfield::io::{Compression, SaveOptions};
+use brickfield::PackProgress;
 use brickfield::options::{progress_bar, values};
-use brickfield::{PackProgress, pack};
-use brickfield_conformance::volumes::PhantomSlices;
+use brickfield_conformance::volumes::pack_phantom;
 use clap::Parser;
 
 /// Packs the phantom as OME-Zarr with all coarser levels; it is made slice by slice, so that a volume larger than memory can be had
@@ -23,16 +22,12 @@ struct Arguments {
 
 fn main() -> Result<ExitCode> {
     let Arguments { volume, out } = Arguments::parse();
-    let mut options = SaveOptions::default();
-    options.compression = Compression::Lossless;
     let bar = progress_bar("packing the phantom");
     let mut told = |p: PackProgress| {
         bar.set_length(p.n_total);
         bar.set_position(p.n_done);
     };
-    let name = PathBuf::from("the phantom");
-    let mut slices = || Ok(Box::new(PhantomSlices::new(volume.dims, volume.scalar)) as _);
-    let packed = pack(&name, &mut slices, &out, &options, &mut told);
+    let packed = pack_phantom(volume.dims, volume.scalar, &out, &mut told);
     bar.finish_and_clear();
     let packed = packed?;
     println!("{}: {} voxels of {}, levels 0 to {}", out.display(), volume.dims, packed.scalar, packed.coarsest.0);

@@ -12,7 +12,6 @@ mod date;
 mod devices;
 mod errors;
 mod hold;
-mod memory;
 mod phantoms;
 mod report;
 mod steady;
@@ -130,7 +129,7 @@ pub fn measure(args: &GpuArgs, say: &mut dyn FnMut(&str)) -> GpuReport {
     let (mut devices, infos) = devices::open(adapter);
     infos.iter().for_each(|info| say(&describe(info)));
     let mut parts = Parts { budget, done: Vec::new(), say };
-    let (date, memory_bytes) = (date::now(), memory::available());
+    let (date, memory_bytes) = (date::now(), crate::memory::available());
     let (mut failures, mut phantoms) = (Vec::new(), Phantoms::default());
     let conformance = parts.run("conformance", CONFORMANCE, |deadline| {
         hold::hold(args.form, adapter, &args.pictures, deadline, &mut failures)

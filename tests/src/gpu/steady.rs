@@ -11,11 +11,11 @@ use brickfield_core::{BrickLayout, BrickSide, Camera, Level, Ray, ScalarType};
 use super::budget::{Deadline, Unmeasured};
 use super::devices::Devices;
 use super::errors::{MODES, tree};
-use super::memory::{available, gigabytes, peak};
 use super::phantoms::Phantoms;
 use super::report::{Steady, TextureRate, VolumeInfo};
 use super::texture::{Reading, texture_rate};
 use super::{Form, PartResult};
+use crate::memory::{available, gigabytes, peak};
 use crate::turns::{Spread, order};
 use crate::volumes::{phantom_camera, phantom_transfer};
 

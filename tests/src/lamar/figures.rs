@@ -13,7 +13,7 @@ use super::scenes::{DataSet, Geometry, data_sets, geometries, geometries_of, sce
 use super::seams::{camera as cube_camera, cube};
 use crate::compare::rivals::Rivals;
 use crate::paper::panels::{beside, stacked};
-use crate::paper::{Missed, PaperError};
+use crate::paper::{Missed, PaperError, frame_of};
 
 /// Bricks' side in figure 14: the paper's.
 const SIDE: BrickSide = BrickSide::S16;
@@ -88,8 +88,7 @@ fn render(
 ) -> Result<(Image<f32>, Vec<BrickId>), PaperError> {
     let mut residency = Residency::default();
     let plan = prepare(tree, scene, &mut residency)?;
-    let name = backend.describe().backend;
-    let frame = backend.render(&plan).map_err(|source| PaperError::Render { backend: name, source })?;
+    let frame = frame_of(backend, &plan)?;
     Ok((frame.image, residency.bricks().to_vec()))
 }
 

@@ -13,7 +13,7 @@ use super::LamarArgs;
 use super::scenes::{Geometry, geometries, geometries_of, rasterises, scene, tree};
 use crate::compare::rivals::Rivals;
 use crate::metrics::errors;
-use crate::paper::{Missed, PaperError, print};
+use crate::paper::{Missed, PaperError, frame_of, print};
 
 /// Voxels along the cube's side.
 const SIDE: u32 = 96;
@@ -215,8 +215,7 @@ fn render(
         Some(cut) => prepare_selection(tree, scene, cut, &mut residency)?,
         None => prepare(tree, scene, &mut residency)?,
     };
-    let name = backend.describe().backend;
-    Ok(backend.render(&plan).map_err(|source| PaperError::Render { backend: name, source })?.image)
+    Ok(frame_of(backend, &plan)?.image)
 }
 
 /// The picture of the cube as its extinction and the rays' ways through it say.

@@ -13,7 +13,7 @@ use super::scenes::{geometries, rasterises, scene, tree};
 use crate::compare::rivals::Rivals;
 use crate::metrics::errors;
 use crate::orders::OrderRow;
-use crate::paper::{Missed, PaperError, print};
+use crate::paper::{Missed, PaperError, frame_of, print};
 use crate::volumes::phantom;
 
 /// Facets' sides, in pixels: the coarsest are a sixth of the picture.
@@ -42,7 +42,7 @@ pub(super) fn run(args: &LamarArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
             scene.placement = Placement::TessellatedShells { facet_pixels };
             scene.technique = Technique::Polygons(Target::Float32);
             let plan = prepare(&tree, &scene, &mut Residency::default())?;
-            let image = backend.render(&plan).map_err(|source| PaperError::Render { backend: name, source })?.image;
+            let image = frame_of(backend.as_mut(), &plan)?.image;
             found.push((f64::from(facet_pixels), errors(&image, &answer)?.rmse));
         }
         let words: Vec<String> = found.iter().map(|(side, e)| format!("{side}: {e:.2e}")).collect();

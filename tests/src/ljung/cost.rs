@@ -7,7 +7,7 @@ use brickfield::interp::Neighbourhood;
 use brickfield::lod::{BlockLevels, BudgetSize};
 use brickfield::{BlockStyle, Scene, Technique, TransparentBlocks};
 use brickfield_core::glam::UVec3;
-use brickfield_core::{Interblock, Level};
+use brickfield_core::{Image, Interblock, Level};
 
 use super::LjungArgs;
 use super::data::{DataSet, data_sets};
@@ -57,19 +57,17 @@ pub(super) fn run(args: &LjungArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
 
 /// How many blocks a value is interpolated from.
 struct Counts {
-    n_positions: u64,
     /// Positions whose value comes from 1 to 8 blocks.
     by_blocks: [u64; 8],
-    /// Sums of blocks: of all positions, and of the worst of each eight.
-    n_blocks: u64,
-    n_blocks_of_worst: u64,
+    /// The same, each position counted as the worst of its row.
+    by_blocks_of_worst: [u64; 8],
 }
 
 impl Counts {
     /// At eight voxels in a row, everywhere in blocks that are not transparent.
     fn of(data: &DataSet, levels: &[Level]) -> Counts {
         let (layout, scheme) = (data.blocks.layout(), Interblock::MaximumDistance);
-        let mut counts = Counts { n_positions: 0, by_blocks: [0; 8], n_blocks: 0, n_blocks_of_worst: 0 };
+        let mut counts = Counts { by_blocks: [0; 8], by_blocks_of_worst: [0; 8] };
         let n_at = |voxel: UVec3| {
             let around = Neighbourhood::around(layout, voxel.as_dvec3().to_array());
             let weights = around.weights(layout, scheme, |block| levels[layout.ordinal(block)]);
@@ -82,14 +80,11 @@ impl Counts {
             let (first, extent) = (layout.first_voxel(block), layout.extent(block));
             for z in 0..extent.z {
                 for (x, y) in (0..extent.y).flat_map(|y| (0..extent.x).step_by(ROW as usize).map(move |x| (x, y))) {
-                    let row = (x..extent.x.min(x + ROW)).map(|x| n_at(first + UVec3::new(x, y, z)));
-                    let mut worst = 0;
-                    for n in row {
-                        counts.by_blocks[n - 1] += 1;
-                        (counts.n_positions, counts.n_blocks) = (counts.n_positions + 1, counts.n_blocks + n as u64);
-                        worst = worst.max(n as u64);
-                    }
-                    counts.n_blocks_of_worst += worst * u64::from(ROW.min(extent.x - x));
+                    let row: Vec<usize> =
+                        (x..extent.x.min(x + ROW)).map(|x| n_at(first + UVec3::new(x, y, z))).collect();
+                    row.iter().for_each(|n| counts.by_blocks[n - 1] += 1);
+                    let worst = row.iter().copied().max().unwrap_or(1);
+                    counts.by_blocks_of_worst[worst - 1] += row.len() as u64;
                 }
             }
         }
@@ -102,13 +97,15 @@ const ROW: u32 = 8;
 
 impl std::fmt::Display for Counts {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let share = |n: u64| n as f64 / self.n_positions.max(1) as f64;
+        let n_positions = self.by_blocks.iter().sum::<u64>().max(1) as f64;
+        let share = |n: u64| n as f64 / n_positions;
+        let mean = |by_blocks: &[u64; 8]| share((1..).zip(by_blocks).map(|(n, times)| n * times).sum());
         let by_blocks: Vec<String> = self.by_blocks.iter().map(|n| format!("{:.1} %", 100.0 * share(*n))).collect();
         write!(
             f,
             "values come from {:.2} blocks in the mean, {:.2} in the worst of {ROW} in a row; from 1, 2, ... 8 blocks: {}",
-            share(self.n_blocks),
-            share(self.n_blocks_of_worst),
+            mean(&self.by_blocks),
+            mean(&self.by_blocks_of_worst),
             by_blocks.join(", ")
         )
     }
@@ -120,15 +117,10 @@ fn compare_insides(args: &LjungArgs, rivals: &mut Rivals, data: &DataSet, levels
     let answer = answer(data, &scene);
     for backend in &mut rivals.present {
         let style = |transparent| BlockStyle { transparent, ..style(BLENDED) };
-        let mut contestants = [TransparentBlocks::Blended, TransparentBlocks::Empty]
+        let contestants = [TransparentBlocks::Blended, TransparentBlocks::Empty]
             .map(|inside| Contestant::of_blocks(&data.blocks, levels.to_vec(), style(inside), scene.clone()));
-        let mut pictures = [None, None];
-        let ms = take_turns::<PaperError>(2, args.common.frames, |turn| {
-            let frame = contestants[turn.contestant].take(turn, backend.as_mut())?;
-            pictures[turn.contestant] = Some(frame.image);
-            Ok(frame.ms)
-        })?;
-        let of_both = pictures.iter().flatten().map(|picture| Error::of(picture, &answer));
+        let (ratio, pictures) = duel(args, backend.as_mut(), contestants)?;
+        let of_both = pictures.iter().map(|picture| Error::of(picture, &answer));
         let errors: Vec<String> =
             of_both.map(|error| error.map(|error| error.to_string())).collect::<Result<_, _>>()?;
         print(&format!(
@@ -136,7 +128,7 @@ fn compare_insides(args: &LjungArgs, rivals: &mut Rivals, data: &DataSet, levels
             data.name,
             backend.describe().backend,
             errors.join("; or "),
-            Ratio::of(&ms[0], &ms[1])
+            ratio
         ))?;
     }
     Ok(())
@@ -152,23 +144,18 @@ fn compare_slices(args: &LjungArgs, rivals: &mut Rivals, data: &DataSet, levels:
         ..scene
     };
     for backend in &mut rivals.present {
-        let mut contestants = [Slices::InteriorsFirst, Slices::Together].map(|slices| {
+        let contestants = [Slices::InteriorsFirst, Slices::Together].map(|slices| {
             let style = BlockStyle { slices, ..style(BLENDED) };
             Contestant::of_blocks(&data.blocks, levels.to_vec(), style, scene.clone())
         });
-        let ms = take_turns::<PaperError>(2, args.common.frames, |turn| {
-            Ok(contestants[turn.contestant].take(turn, backend.as_mut())?.ms)
-        })?;
+        let (ratio, _) = duel(args, backend.as_mut(), contestants)?;
         let name = backend.describe().backend;
-        print(&format!(
-            "{}, at 32:1, exact, {name}: slices with interiors first / together: {}",
-            data.name,
-            Ratio::of(&ms[0], &ms[1])
-        ))?;
+        print(&format!("{}, at 32:1, exact, {name}: slices with interiors first / together: {ratio}", data.name))?;
     }
     Ok(())
 }
 
+/// The blended blocks over the nearest.
 fn ratio(
     args: &LjungArgs,
     backend: &mut dyn Backend,
@@ -177,11 +164,22 @@ fn ratio(
     mode: Mode,
 ) -> Result<Ratio, PaperError> {
     let scene = data.scene(args, mode)?;
-    let joins = [BLENDED, Join::Shared];
-    let mut contestants =
-        joins.map(|join| Contestant::of_blocks(&data.blocks, levels.to_vec(), style(join), scene.clone()));
+    let contestants = [BLENDED, Join::Shared]
+        .map(|join| Contestant::of_blocks(&data.blocks, levels.to_vec(), style(join), scene.clone()));
+    Ok(duel(args, backend, contestants)?.0)
+}
+
+/// Two contestants in turns: the time of the first over that of the second, and their pictures.
+fn duel(
+    args: &LjungArgs,
+    backend: &mut dyn Backend,
+    mut contestants: [Contestant<'_>; 2],
+) -> Result<(Ratio, [Image<f32>; 2]), PaperError> {
+    let mut pictures = [None, None];
     let ms = take_turns::<PaperError>(2, args.common.frames, |turn| {
-        Ok(contestants[turn.contestant].take(turn, backend)?.ms)
+        let frame = contestants[turn.contestant].take(turn, backend)?;
+        pictures[turn.contestant] = Some(frame.image);
+        Ok(frame.ms)
     })?;
-    Ok(Ratio::of(&ms[0], &ms[1]))
+    Ok((Ratio::of(&ms[0], &ms[1]), pictures.map(|picture| picture.expect("both had their turns"))))
 }

@@ -15,7 +15,7 @@ use super::schemes::{joins, style};
 use super::table::answer;
 use crate::compare::rivals::Rivals;
 use crate::paper::panels::{beside, heat_pixel, stacked};
-use crate::paper::{Missed, PaperError};
+use crate::paper::{Missed, PaperError, frame_of};
 
 /// The difference at the bright end.
 const BRIGHT: f64 = 20.0;
@@ -56,8 +56,7 @@ fn of_scene(
     let (mut pictures, mut differences) = (vec![full(answer)], vec![Image::transparent(answer.size())]);
     for join in joins() {
         let plan = prepare_blocks(&data.blocks, scene, levels.levels(), style(join), &mut BlockResidency::default())?;
-        let name = backend.describe().backend;
-        let frame = backend.render(&plan).map_err(|source| PaperError::Render { backend: name, source })?;
+        let frame = frame_of(backend, &plan)?;
         differences.push(difference(&frame.image, answer));
         pictures.push(frame.image);
     }

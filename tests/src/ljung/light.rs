@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use brickfield::bricks::{BlockOptions, BrickTree, BuildOptions, Downsampling, build_blocks, build_tree};
+use brickfield::bricks::{BlockOptions, BlockSource, BrickTree, BuildOptions, Downsampling, build_blocks, build_tree};
 use brickfield::frame::{FramePlan, Join};
 use brickfield::lod::{BlockLevels, Criterion};
 use brickfield::{BlockResidency, BlockStyle, Residency, Scene, TransparentBlocks, prepare, prepare_blocks};
@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use super::LjungArgs;
 use crate::compare::rivals::Rivals;
-use crate::paper::{Missed, PaperError, print};
+use crate::paper::{Missed, PaperError, frame_of, print};
 use crate::volumes::fill;
 
 /// Samples along the axes, and world units between them.
@@ -87,7 +87,7 @@ pub(super) fn run(args: &LjungArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, 
             let (plan, expected) = (ball.plan(form, &scene)?, ball.expected(form, &scene));
             for backend in &mut rivals.present {
                 let name = backend.describe().backend;
-                let frame = backend.render(&plan).map_err(|source| PaperError::Render { backend: name, source })?;
+                let frame = frame_of(backend.as_mut(), &plan)?;
                 let row = row((name, form, light), frame.image.pixels(), &expected);
                 print(&line(&row))?;
                 rows.push(row);
@@ -178,7 +178,7 @@ impl Ball {
             Form::Blocks(level) | Form::Stored(level) => {
                 let options = BlockOptions { side: BLOCK, ..BlockOptions::default() };
                 let blocks = build_blocks(Arc::clone(&self.volume), &options)?;
-                let levels = BlockLevels::uniform(*brickfield::bricks::BlockSource::layout(&blocks), level);
+                let levels = BlockLevels::uniform(*blocks.layout(), level);
                 let join = Join::Blend(Interblock::MaximumDistance);
                 let style = BlockStyle { join, transparent: TransparentBlocks::Blended, ..BlockStyle::default() };
                 Ok(prepare_blocks(&blocks, scene, levels.levels(), style, &mut BlockResidency::default())?)

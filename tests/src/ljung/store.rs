@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use brickfield::bricks::BlockSource;
 use brickfield::cpu::discrete;
 use brickfield::frame::{Backend, Join, Mode};
-use brickfield::io::{Compression, OpenOptions, SaveOptions};
+use brickfield::io::OpenOptions;
 use brickfield::lod::{
     BlockBudget, BlockErrors, BlockSelection, BudgetSize, OneSampleBlocks, Slab, select_block_levels,
 };
 use brickfield::optics::automatic;
-use brickfield::{BlockResidency, Scene, StoreBlocks, StoreLimits, Viewpoint, pack, prepare_blocks};
+use brickfield::{BlockResidency, Scene, StoreBlocks, StoreLimits, Viewpoint, prepare_blocks};
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, Grid, Image, Interblock, Level, ScalarType, TransferFunction};
 use serde::Serialize;
@@ -19,14 +19,12 @@ use super::LjungArgs;
 use super::error::Error;
 use super::schemes::style;
 use crate::compare::rivals::Rivals;
-use crate::paper::{Missed, PaperError, mib, print};
-use crate::peak::{self, ProcessMemory};
-use crate::volumes::PhantomSlices;
+use crate::memory;
+use crate::paper::{Missed, PaperError, frame_of, mib, print};
+use crate::volumes::pack_phantom;
 
 /// Voxels along a side of the part whose error is measured.
 const PART: u32 = 192;
-/// Most bytes of the level from which a transfer function is chosen.
-const OVERVIEW_BYTES: u64 = 16 << 20;
 const JOIN: Join = Join::Blend(Interblock::MaximumDistance);
 
 /// A backend's frame.
@@ -72,30 +70,24 @@ fn stored(args: &LjungArgs) -> Result<PathBuf, PaperError> {
         print(&format!("{} is there", path.display()))?;
         return Ok(path);
     }
-    let mut options = SaveOptions::default();
-    options.compression = Compression::Lossless;
-    peak::restart();
-    let mut slices = || Ok(Box::new(PhantomSlices::new(dims, ScalarType::U8)) as _);
-    pack(&PathBuf::from("the phantom"), &mut slices, &path, &options, &mut |_| ())?;
-    let n_bytes = dims.as_u64vec3().element_product();
-    print(&format!("packed {:.0} MiB of voxels as {}; {}", mib(n_bytes), path.display(), peak_text()))?;
+    memory::restart_peak();
+    pack_phantom(dims, ScalarType::U8, &path, &mut |_| ())?;
+    let (n_bytes, peak) = (dims.as_u64vec3().element_product(), peak_text(memory::peak()));
+    print(&format!("packed {:.0} MiB of voxels as {}; {peak}", mib(n_bytes), path.display()))?;
     Ok(path)
 }
 
-fn peak_text() -> String {
-    match ProcessMemory::now() {
-        Some(memory) => format!("peak memory {:.0} MiB", mib(memory.peak)),
-        None => "peak memory unknown on this system".to_owned(),
-    }
+fn peak_text(peak: Option<u64>) -> String {
+    peak.map_or("peak memory unknown on this system".to_owned(), |peak| format!("peak memory {:.0} MiB", mib(peak)))
 }
 
 fn of_backend(args: &LjungArgs, path: &Path, backend: &mut dyn Backend) -> Result<StoreRow, PaperError> {
-    let resident_before = ProcessMemory::now().map(|memory| memory.resident);
-    peak::restart();
+    let resident_before = memory::resident();
+    memory::restart_peak();
     let budget_bytes = args.store_mib << 20;
     let limits = StoreLimits::of_budget(budget_bytes);
     let store = StoreBlocks::open(path, args.blocks, limits, &OpenOptions::default(), &mut |_| ())?;
-    let transfer = automatic(&store.overview(OVERVIEW_BYTES)?);
+    let transfer = automatic(&store.overview(StoreBlocks::OVERVIEW_BYTES)?);
     let slab = Slab::of_block(store.layout(), store.grid());
     let errors = BlockErrors::estimate(store.layout(), store.summaries(), &transfer, slab)?;
     let size = BudgetSize::Bytes(budget_bytes - limits.cache_bytes);
@@ -107,8 +99,8 @@ fn of_backend(args: &LjungArgs, path: &Path, backend: &mut dyn Backend) -> Resul
     let mut residency = BlockResidency::default();
     let plan = prepare_blocks(&store, &scene, selection.levels.levels(), style(JOIN), &mut residency)?;
     let name = backend.describe().backend;
-    let frame = backend.render(&plan).map_err(|source| PaperError::Render { backend: name, source })?;
-    let peak = ProcessMemory::now().map(|memory| memory.peak);
+    let frame = frame_of(backend, &plan)?;
+    let peak = memory::peak();
     args.common.write_picture(&format!("store-{name}"), &frame.image, "the store within its budget")?;
     let slots = plan.field().slots();
     let (slot_bytes, sample_bytes) = (slots.n_bytes() as u64, slots.format().n_bytes() as u64);
@@ -167,8 +159,7 @@ fn error_of_part(
     let answer: Image<f64> = discrete(&prepare_blocks(store, &scene, &whole, style(JOIN), &mut residency)?).image;
     let mut residency = BlockResidency::default();
     let plan = prepare_blocks(store, &scene, selection.levels.levels(), style(JOIN), &mut residency)?;
-    let name = backend.describe().backend;
-    let frame = backend.render(&plan).map_err(|source| PaperError::Render { backend: name, source })?;
+    let (frame, name) = (frame_of(backend, &plan)?, backend.describe().backend);
     args.common.write_picture(&format!("store-part-{name}"), &frame.image, "the part that is drawn worst")?;
     Ok(Error::of(&frame.image, &answer)?)
 }
@@ -183,10 +174,8 @@ fn full_inside(store: &StoreBlocks, block: UVec3, clip: &Aabb) -> Level {
 
 impl std::fmt::Display for StoreRow {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let memory = match (self.resident_before, self.peak) {
-            (Some(before), Some(peak)) => format!("peak memory {:.0} MiB ({:.0} before)", mib(peak), mib(before)),
-            _ => "peak memory unknown on this system".to_owned(),
-        };
+        let before = self.resident_before.map(|before| format!(" ({:.0} before)", mib(before))).unwrap_or_default();
+        let memory = peak_text(self.peak) + &before;
         write!(
             f,
             "{}: {:.0} MiB of voxels, {} MiB on host and device; blocks of levels from 0: {:?}\n  voxels on the host {:.1} MiB, on the device {:.1} MiB; \

@@ -5,6 +5,7 @@ pub(crate) mod panels;
 
 use std::path::PathBuf;
 
+use brickfield::frame::{Backend, Frame, FramePlan};
 use brickfield::options::values;
 use brickfield::{write_exr, write_png};
 use brickfield_core::Image;
@@ -193,6 +194,12 @@ impl Missed {
     pub(crate) fn of_claim(claim: &Claim) -> Option<Missed> {
         (!claim.kept).then(|| Missed::of_times(claim.to_string()))
     }
+}
+
+/// A frame of a backend.
+pub(crate) fn frame_of(backend: &mut dyn Backend, plan: &FramePlan) -> Result<Frame, PaperError> {
+    let name = backend.describe().backend;
+    backend.render(plan).map_err(|source| PaperError::Render { backend: name, source })
 }
 
 /// A line on standard output.

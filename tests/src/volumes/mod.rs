@@ -10,7 +10,9 @@ mod shape;
 
 pub use enlarge::enlarge;
 pub use field::FieldFormula;
-pub use phantom::{PHANTOM_DIMS, Phantom, PhantomSlices, phantom, phantom_camera, phantom_of, phantom_transfer};
+pub use phantom::{
+    PHANTOM_DIMS, Phantom, PhantomSlices, pack_phantom, phantom, phantom_camera, phantom_of, phantom_transfer,
+};
 pub use shape::Shape;
 
 use brickfield_core::glam::{DVec3, UVec3};

@@ -4,7 +4,10 @@
 //! cubic nor isotropic, so that swapped axes and mixed units show too; soft tissue, hard bone and sharp metal lie in and
 //! behind each other; the neck is opaque up to the volume's face; about 70 % is empty, so skipping matters.
 
-use brickfield::io::{Format, ReadError, SliceSource, VolumeFacts, WorldFrame};
+use std::path::Path;
+
+use brickfield::io::{Compression, Format, ReadError, SaveOptions, SliceSource, VolumeFacts, WorldFrame};
+use brickfield::{PackError, PackProgress, Packed, pack};
 use brickfield_core::glam::{DMat3, DVec3, UVec3};
 use brickfield_core::{
     Camera, CameraError, Grid, Knot, Projection, Rescale, ScalarType, TransferFunction, Volume, Voxels,
@@ -88,6 +91,22 @@ impl SliceSource for PhantomSlices {
         self.n_made += n;
         Ok(fill_unit(&slab, *scalar, |p| value(&self.parts, p - 0.5 * EXTENT_MM)).into_voxels())
     }
+}
+
+/// Packs the phantom of some resolution as a store, slice by slice, without loss.
+///
+/// # Errors
+/// As [`pack`].
+pub fn pack_phantom(
+    dims: UVec3,
+    scalar: ScalarType,
+    out: &Path,
+    told: &mut dyn FnMut(PackProgress),
+) -> Result<Packed, PackError> {
+    let mut options = SaveOptions::default();
+    options.compression = Compression::Lossless;
+    let mut slices = || Ok(Box::new(PhantomSlices::new(dims, scalar)) as _);
+    pack(Path::new("the phantom"), &mut slices, out, &options, told)
 }
 
 /// Extinction per millimetre and colour of the phantom's tissues.

@@ -3,6 +3,8 @@
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{BlockLayout, GRADIENT_ZERO, Grid, Level, Rescale, Scalar, ValueRange};
 
+use super::positions;
+
 /// The gradient, in data values per world unit, that no gradient of a volume exceeds: its range of values in every spacing.
 pub(super) fn greatest_of(range: ValueRange, grid: &Grid) -> f64 {
     let (half, per_world) = (0.5 * range.max - 0.5 * range.min, grid.spacing().recip().length());
@@ -28,7 +30,7 @@ pub(super) fn gradient_codes<T: Scalar>(
     let around = Around::of(volume, first, extent);
     let n = level.dims_of(extent);
     let mut sums = vec![(DVec3::ZERO, 0u32); n.element_product() as usize];
-    for voxel in voxels_of(extent) {
+    for voxel in positions(extent) {
         let sample = voxel / level.stride();
         let sum = &mut sums[(sample.x + n.x * (sample.y + n.y * sample.z)) as usize];
         // Parts of the greatest: whatever the values are, squares are finite.
@@ -49,11 +51,6 @@ fn code(gradient: DVec3) -> [u8; 4] {
     [x, y, z, (length.min(1.0).sqrt() * 255.0).round() as u8]
 }
 
-fn voxels_of(extent: UVec3) -> impl Iterator<Item = UVec3> {
-    (0..extent.element_product())
-        .map(move |i| UVec3::new(i % extent.x, i / extent.x % extent.y, i / (extent.x * extent.y)))
-}
-
 /// The data values of a block's voxels and one beyond on every side: at the volume's faces the outer voxels again.
 struct Around {
     values: Vec<f64>,
@@ -72,7 +69,7 @@ impl Around {
         };
         let distance = |axis: usize| move |i: u32| f64::from(beside(axis, i + 2) - beside(axis, i));
         let distances = [0, 1, 2].map(|axis| (0..extent[axis]).map(distance(axis)).collect());
-        Around { values: voxels_of(n).map(value).collect(), n, distances }
+        Around { values: positions(n).map(value).collect(), n, distances }
     }
 
     /// The slopes along the axes at a voxel of the block, in data values per voxel: weights 1, 2, 1 across (Sobel).

@@ -3,6 +3,7 @@
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{BlockSummary, Level, Rescale, ValueRange};
 
+use super::positions;
 use super::shrink::{BlockScalar, BlockVoxels};
 use super::summary::Parts;
 
@@ -59,8 +60,7 @@ impl Moments {
     fn next(&self) -> Moments {
         let level = Level(self.level.0 + 1);
         let n = level.dims_of(self.extent);
-        let samples = (0..n.element_product()).map(|i| UVec3::new(i % n.x, i / n.x % n.y, i / (n.x * n.y)));
-        let all = samples.map(|sample| MeanVariance::of(self.parts_of(sample))).collect();
+        let all = positions(n).map(|sample| MeanVariance::of(self.parts_of(sample))).collect();
         Moments { level, extent: self.extent, all }
     }
 

@@ -131,8 +131,9 @@ impl BlockArgs {
             bar.set_length(p.n_total.into());
             bar.set_position(p.n_done.into());
         };
-        let store = StoreBlocks::open(path, side, limits, &input.open_options(), &mut told)?;
+        let opened = StoreBlocks::open(path, side, limits, &input.open_options(), &mut told);
         bar.finish_and_clear();
+        let store = opened?;
         store.facts().notes.iter().for_each(|text| note(text));
         let transfer = view.transfer_of_store(&store)?;
         Ok(BlockSubject { frame: store.facts().frame, transfer, blocks: Blocks::Store(Box::new(store)) })

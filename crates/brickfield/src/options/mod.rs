@@ -27,10 +27,6 @@ pub use light::LightOptions;
 use crate::StoreBlocks;
 use crate::{Quality, Scene, Skipping, Technique, Viewpoint};
 
-/// Most bytes of the coarse level of a store from which a transfer function is chosen.
-#[cfg(feature = "formats")]
-const OVERVIEW_BYTES: u64 = 16 << 20;
-
 /// How a file is read.
 #[derive(Args, Clone, Debug)]
 pub struct InputOptions {
@@ -374,7 +370,7 @@ impl ViewOptions {
     #[cfg(feature = "formats")]
     fn transfer_of_store(&self, store: &StoreBlocks) -> Result<TransferFunction, OptionError> {
         Ok(match self.named_transfer()? {
-            NamedTransfer::Automatic => brickfield_optics::automatic(&store.overview(OVERVIEW_BYTES)?),
+            NamedTransfer::Automatic => brickfield_optics::automatic(&store.overview(StoreBlocks::OVERVIEW_BYTES)?),
             NamedTransfer::Preset(preset) => preset.transfer(store.range(), diagonal_world(store.grid()))?,
             NamedTransfer::OfFile(transfer) => transfer,
         })

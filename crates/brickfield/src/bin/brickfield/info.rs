@@ -8,7 +8,7 @@ use brickfield::core::{Level, Rescale, Volume};
 use brickfield::io::{Choice, Opened};
 use serde_json::{Value, json};
 
-use crate::{Failure, InfoArgs, print};
+use crate::{Failure, InfoArgs, mib, print};
 
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let opened = args.input.open(&args.file)?;
@@ -126,7 +126,6 @@ fn of_tree(text: &mut String, tree: &BrickTree) -> fmt::Result {
 }
 
 fn of_level(text: &mut String, tree: &BrickTree, level: Level, memory: &LevelMemory) -> fmt::Result {
-    let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let d = tree.layout().level_dims(level);
     let dims = format!("{} x {} x {}", d.x, d.y, d.z);
     writeln!(

@@ -260,3 +260,7 @@ impl RenderArgs {
         if self.validation { Validation::On } else { Validation::Off }
     }
 }
+
+fn mib(bytes: u64) -> f64 {
+    bytes as f64 / f64::from(1 << 20)
+}

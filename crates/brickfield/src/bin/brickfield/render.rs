@@ -18,7 +18,7 @@ use brickfield::{
     prepare_blocks, write_picture,
 };
 
-use crate::{Failure, RenderArgs, print};
+use crate::{Failure, RenderArgs, mib, print};
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     // Options that can be refused are refused before any work is done.
@@ -116,10 +116,6 @@ fn store_summary(store: &StoreBlocks, uploaded: u64) -> String {
         mib(store.n_summary_bytes()),
         mib(uploaded),
     )
-}
-
-fn mib(bytes: u64) -> f64 {
-    bytes as f64 / f64::from(1 << 20)
 }
 
 fn note_if_nothing_shows(plan: &FramePlan) {

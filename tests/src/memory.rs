@@ -1,0 +1,50 @@
+//! Main memory, where the system tells it.
+
+/// Bytes that a new process may take without swapping (Linux: `MemAvailable`).
+pub(crate) fn available() -> Option<u64> {
+    kilobytes(&std::fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:")
+}
+
+/// The bytes that this process holds (Linux: `VmRSS`).
+pub(crate) fn resident() -> Option<u64> {
+    of_process("VmRSS:")
+}
+
+/// The most bytes that this process held since it began, or since [`restart_peak`] (Linux: `VmHWM`).
+pub(crate) fn peak() -> Option<u64> {
+    of_process("VmHWM:")
+}
+
+/// Counts the peak anew. Where the system refuses, the peak is that of the whole process: never too little.
+pub(crate) fn restart_peak() {
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+}
+
+fn of_process(name: &str) -> Option<u64> {
+    kilobytes(&std::fs::read_to_string("/proc/self/status").ok()?, name)
+}
+
+/// Bytes as people read them.
+pub(crate) fn gigabytes(n_bytes: u64) -> String {
+    format!("{:.1} GB", n_bytes as f64 * 1e-9)
+}
+
+fn kilobytes(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|l| l.strip_prefix(name))?;
+    line.split_whitespace().next()?.parse::<u64>().ok().map(|kilobytes| kilobytes << 10)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_found_by_their_name() {
+        let text = "MemFree:    12 kB\nMemAvailable:   20480 kB\n";
+        assert_eq!(kilobytes(text, "MemAvailable:"), Some(20_971_520));
+        assert_eq!(kilobytes(text, "VmHWM:"), None);
+        let status = "Name:\tx\nVmHWM:\t    2048 kB\nVmRSS:\t    1024 kB\n";
+        assert_eq!((kilobytes(status, "VmHWM:"), kilobytes(status, "VmRSS:")), (Some(2 << 20), Some(1 << 20)));
+        assert_eq!(gigabytes(1_340_000_000), "1.3 GB");
+    }
+}
