@@ -87,7 +87,9 @@ pub fn prepare_blocks(
     }
     let coarsest = levels.iter().copied().max().unwrap_or(Level(0));
     let Course { domain, sampling, rays } = Course::new(source.grid(), scene, coarsest)?;
-    residency.hold(source, levels, &companions(scene, levels, style.classification))?;
+    let is_coarse = coarsest > Level(0);
+    let companions = companions(scene, style.classification).filter(|c| is_coarse || *c != Companion::Spread);
+    residency.hold(source, levels, &companions.collect::<Vec<_>>())?;
     let style = match scene.quality {
         Quality::Final => style,
         Quality::Draft => BlockStyle { join: Join::Shared, ..style },
@@ -105,16 +107,19 @@ pub fn prepare_blocks(
     Ok(FramePlan::new(PlanParts { lighting, drawing, ..parts })?)
 }
 
-/// The companions of samples that a frame needs: where all samples are voxels, or all values look alike, spreads change nothing.
-fn companions(scene: &Scene, levels: &[Level], classification: Classification) -> Vec<Companion> {
-    let is_coarse = levels.iter().any(|level| *level > Level(0));
-    let is_needed = |companion: &Companion| match companion {
-        Companion::Spread => {
-            classification == Classification::Prefiltered && is_coarse && scene.transfer.knots().len() > 1
-        }
-        Companion::Gradient => scene.light.is_some_and(|light| light.normals() == Normals::Stored),
-    };
-    Companion::ALL.into_iter().filter(is_needed).collect()
+/// The bytes that each sample of flat blocks takes besides its value: those of a [`BlockBudget`](brickfield_lod::BlockBudget).
+pub fn companion_bytes(scene: &Scene, classification: Classification) -> u8 {
+    companions(scene, classification).map(|companion| companion.n_bytes() as u8).sum()
+}
+
+/// The companions of samples that a frame needs. Where all values look alike, spreads change nothing; nor where all samples are voxels.
+fn companions(scene: &Scene, classification: Classification) -> impl Iterator<Item = Companion> {
+    let is_prefiltered = classification == Classification::Prefiltered && scene.transfer.knots().len() > 1;
+    let has_stored_normals = scene.light.is_some_and(|light| light.normals() == Normals::Stored);
+    Companion::ALL.into_iter().filter(move |companion| match companion {
+        Companion::Spread => is_prefiltered,
+        Companion::Gradient => has_stored_normals,
+    })
 }
 
 fn check_levels(layout: &BlockLayout, levels: &[Level]) -> Result<(), PrepareBlocksError> {
@@ -265,6 +270,9 @@ mod tests {
         assert!(stored.features().contains(Feature::StoredGradients));
         let central = plan(Normals::Central);
         assert!(central.gradients().is_none() && central.field().companions(Companion::Gradient).is_none());
+        let bytes = |normals| companion_bytes(&on(normals), Classification::OfMean);
+        assert_eq!((bytes(Normals::Stored), bytes(Normals::Central)), (4, 0));
+        assert_eq!(companion_bytes(&on(Normals::Stored), Classification::Prefiltered), 5);
         let tree = build_tree(source.volume(), &BuildOptions::default()).unwrap();
         let refused = crate::prepare(&tree, &on(Normals::Stored), &mut crate::Residency::default());
         assert_eq!(refused.err(), Some(PrepareError::Plan(PlanError::NoGradients)));

@@ -23,7 +23,7 @@ pub mod overlay;
 
 pub use backends::{AdapterInfo, BackendError, BackendKind, BackendStatus, Validation, backends, open_backend};
 pub use block_residency::BlockResidency;
-pub use blocks::{BlockStyle, Classification, PrepareBlocksError, TransparentBlocks, prepare_blocks};
+pub use blocks::{BlockStyle, Classification, PrepareBlocksError, TransparentBlocks, companion_bytes, prepare_blocks};
 pub use brickfield_bricks as bricks;
 pub use brickfield_core as core;
 pub use brickfield_cpu as cpu;

@@ -211,6 +211,25 @@ fn a_store_is_drawn_like_the_file_by_the_parts_that_its_blocks_need() {
     }
 }
 
+#[test]
+#[cfg(feature = "formats")]
+fn a_store_without_a_budget_is_held_to_the_limit_of_the_reader() {
+    let place = WorkFolder::new();
+    std::fs::write(place.path().join("a.raw"), vec![7u8; 128 * 128 * 80]).unwrap();
+    assert_eq!(place.run("pack|a.raw|-o|a.zarr|--raw|128x128x80,u8").status.code(), Some(0));
+    let render = |words: &str| place.run(&format!("render|a.zarr|-o|b.png|{SMALL}|--blocks|16|--max-mib|1{words}"));
+    let out = render("");
+    assert_eq!(out.status.code(), Some(2), "{}", text(&out.stderr));
+    assert!(
+        text(&out.stderr).contains("all blocks at level 0 take 2 MiB; --max-mib allows 1"),
+        "{}",
+        text(&out.stderr)
+    );
+    for words in ["|--block-level|1", "|--budget-mib|1.5", "|--ratio|2"] {
+        assert_eq!(render(words).status.code(), Some(0), "{words}");
+    }
+}
+
 const SMALL: &str = "--backend|cpu|--size|24x18";
 
 impl WorkFolder {

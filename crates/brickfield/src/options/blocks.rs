@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use brickfield_bricks::{BlockOptions, BlockSource, BlockVolume, build_blocks};
-use brickfield_core::{BlockSide, Companion, TransferFunction, Volume};
+use brickfield_core::{BlockSide, TransferFunction, Volume};
 use brickfield_frame::{Join, Slices};
 use brickfield_io::WorldFrame;
 use brickfield_lod::{
@@ -16,7 +16,7 @@ use clap::Args;
 use super::{InputOptions, OptionError, ViewOptions, values};
 #[cfg(feature = "formats")]
 use super::{note, progress_bar};
-use crate::{BlockStyle, Classification, Scene, TransparentBlocks};
+use crate::{BlockStyle, Classification, Scene, TransparentBlocks, companion_bytes};
 #[cfg(feature = "formats")]
 use crate::{StoreBlocks, StoreLimits, SummaryProgress};
 
@@ -27,7 +27,7 @@ pub struct BlockArgs {
     /// an octree of bricks (--brick, --downsampling and --lod are not for blocks)
     #[arg(long, value_name = "N", value_parser = values::block_side)]
     pub blocks: Option<BlockSide>,
-    /// Bytes that the samples of all blocks may take, in MiB: on the host, and on the device. Of an OME-Zarr, which is read in parts, a
+    /// Bytes that the samples of all blocks and their spreads and gradients may take, in MiB: on the host, and on the device. Of an OME-Zarr, which is read in parts, a
     /// quarter of them is for unpacked chunks
     #[arg(long, value_name = "MIB", requires = "blocks", conflicts_with_all = ["ratio", "block_level"], value_parser = values::positive)]
     pub budget_mib: Option<f64>,
@@ -64,6 +64,8 @@ pub struct BlockSubject {
     pub frame: WorldFrame,
     /// The transfer function that was asked for.
     pub transfer: TransferFunction,
+    /// Most bytes that blocks of a store may take where no budget says so.
+    pub max_bytes: u64,
 }
 
 /// Where flat blocks come from.
@@ -114,7 +116,7 @@ impl BlockArgs {
         }
         let (volume, frame, transfer) = input.open_to_render(path, view)?;
         let blocks = build_blocks(Arc::new(volume), &BlockOptions { side, ..BlockOptions::default() })?;
-        Ok(BlockSubject { blocks: Blocks::Memory(blocks), frame, transfer })
+        Ok(BlockSubject { blocks: Blocks::Memory(blocks), frame, transfer, max_bytes: input.limits().max_bytes })
     }
 
     #[cfg(feature = "formats")]
@@ -125,7 +127,8 @@ impl BlockArgs {
         side: BlockSide,
         view: &ViewOptions,
     ) -> Result<BlockSubject, OptionError> {
-        let limits = StoreLimits { max_bytes: input.limits().max_bytes, ..self.store_limits() };
+        let max_bytes = input.limits().max_bytes;
+        let limits = StoreLimits { max_bytes, ..self.store_limits() };
         let bar = progress_bar("summing up");
         let mut told = |p: SummaryProgress| {
             bar.set_length(p.n_total.into());
@@ -136,7 +139,7 @@ impl BlockArgs {
         let store = opened?;
         store.facts().notes.iter().for_each(|text| note(text));
         let transfer = view.transfer_of_store(&store)?;
-        Ok(BlockSubject { frame: store.facts().frame, transfer, blocks: Blocks::Store(Box::new(store)) })
+        Ok(BlockSubject { frame: store.facts().frame, transfer, max_bytes, blocks: Blocks::Store(Box::new(store)) })
     }
 
     #[cfg(feature = "formats")]
@@ -157,7 +160,7 @@ impl BlockArgs {
     /// The level of each block: what the budget buys, or one for all.
     ///
     /// # Errors
-    /// A budget that is too small; a level that blocks do not have.
+    /// A budget that is too small; a level that blocks do not have; blocks of a store that take more than the reader's limit.
     pub fn select(&self, subject: &BlockSubject, scene: &Scene) -> Result<BlockSelection, OptionError> {
         let source = subject.blocks.source();
         let (layout, scalar) = (*source.layout(), source.scalar_type());
@@ -171,17 +174,18 @@ impl BlockArgs {
                     return Err(OptionError::BlockLevel { level: level.0, side: layout.side(), most: most.0 });
                 }
                 let levels = BlockLevels::uniform(layout, level);
-                return Ok(BlockSelection { n_bytes: levels.n_bytes(scalar), levels, cost: 0.0 });
+                let n_bytes = levels.n_bytes(scalar);
+                return match subject.blocks.volume().is_none() && n_bytes > subject.max_bytes {
+                    true => Err(OptionError::BlocksTooLarge { level: level.0, n_bytes, max_bytes: subject.max_bytes }),
+                    false => Ok(BlockSelection { n_bytes, levels, cost: 0.0 }),
+                };
             }
         };
         let slab = Slab::of_block(&layout, source.grid());
         let errors = BlockErrors::estimate(&layout, source.summaries(), &scene.transfer, slab)?;
         let view = BlockView { view: scene.view(), clip: scene.clip, importance: Importance::default() };
         let weights = (!self.any_view).then(|| block_weights(&layout, source.grid(), &view));
-        let companion_bytes = match self.classify {
-            Classification::OfMean => 0,
-            Classification::Prefiltered => Companion::Spread.n_bytes() as u8,
-        };
+        let companion_bytes = companion_bytes(scene, self.classify);
         let budget = BlockBudget { size, scalar, companion_bytes, one_sample: OneSampleBlocks::Free };
         Ok(select_block_levels(&layout, errors.levels(), weights.as_deref(), &budget)?)
     }

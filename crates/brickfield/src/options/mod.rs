@@ -209,6 +209,8 @@ pub enum OptionError {
     Budget(#[from] brickfield_lod::BudgetError),
     #[error("--block-level {level}: blocks of {side} voxels have levels 0 to {most}")]
     BlockLevel { level: u8, side: BlockSide, most: u8 },
+    #[error("all blocks at level {level} take {} MiB; --max-mib allows {}: state --budget-mib, --ratio or a coarser --block-level", n_bytes.div_ceil(1 << 20), max_bytes >> 20)]
+    BlocksTooLarge { level: u8, n_bytes: u64, max_bytes: u64 },
     #[error("--transfer: {0}")]
     Preset(#[from] brickfield_core::TransferError),
     #[error("--transfer: {0}")]
@@ -233,6 +235,7 @@ impl OptionError {
             OptionError::Blocks(_) | OptionError::BlockErrors(_) => false,
             OptionError::Budget(_)
             | OptionError::BlockLevel { .. }
+            | OptionError::BlocksTooLarge { .. }
             | OptionError::NoSuchTransfer { .. }
             | OptionError::Camera(_)
             | OptionError::Light(_)
