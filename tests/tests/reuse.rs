@@ -198,7 +198,7 @@ fn leaps_are_over_the_dark_of_the_bricks_that_are_there<B: Open>() {
     for (slot, tone) in [(0, 10), (4, 11), (8, 12)] {
         bricks[slot] = Some(brick(tone));
         let plan = leaping(&bricks);
-        assert!(plan.features().contains(Feature::SkipMacrocells));
+        assert!(plan.features().contains(Feature::SkipDark));
         let leapt = frame(&mut backend, &plan, &bricks).image;
         let whole = backend.render(&self::plan(&bricks)).unwrap().image;
         let pairs = leapt.pixels().iter().flatten().zip(whole.pixels().iter().flatten());

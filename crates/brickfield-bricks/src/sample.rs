@@ -15,7 +15,6 @@ pub(crate) trait BrickScalar: Scalar {
     fn narrow(sum: Self::Sum) -> Self;
     fn bin(self, table: &BinTable) -> usize;
     fn borrow(samples: &[Self]) -> BrickSamples<'_>;
-    fn copy_le_bytes(samples: &[Self], out: &mut [u8]);
 }
 
 /// The samples of one brick in their native type: side^3 of them, x fastest, then y, then z.
@@ -86,7 +85,7 @@ impl BrickSamples<'_> {
     /// If `out` is not [`n_bytes`](Self::n_bytes) long.
     pub fn copy_le_bytes(&self, out: &mut [u8]) {
         assert_eq!(out.len(), self.n_bytes(), "bytes to write a brick to");
-        with_brick_samples!(self, s => BrickScalar::copy_le_bytes(s, out));
+        with_brick_samples!(self, s => Scalar::copy_le_bytes(s, out));
     }
 }
 
@@ -101,12 +100,6 @@ macro_rules! sample {
             #[inline]
             fn bin(self, table: &BinTable) -> usize { $bin(self, table) }
             fn borrow(samples: &[$t]) -> BrickSamples<'_> { BrickSamples::$v(samples) }
-            fn copy_le_bytes(samples: &[$t], out: &mut [u8]) {
-                let (chunks, _) = out.as_chunks_mut::<{ size_of::<$t>() }>();
-                for (chunk, s) in chunks.iter_mut().zip(samples) {
-                    *chunk = s.to_le_bytes();
-                }
-            }
         }
     )* };
 }

@@ -72,6 +72,8 @@ pub trait Scalar: Copy + Default + PartialOrd + Send + Sync + 'static + sealed::
     fn from_f64(value: f64) -> Self;
     /// Wraps a vector of this type.
     fn wrap(values: Vec<Self>) -> Voxels;
+    /// Writes numbers one after the other, little endian, as far as there are both.
+    fn copy_le_bytes(values: &[Self], out: &mut [u8]);
 }
 
 mod sealed {
@@ -88,6 +90,12 @@ macro_rules! scalar {
             #[inline]
             fn from_f64(value: f64) -> Self { $from(value) as $t }
             fn wrap(values: Vec<Self>) -> Voxels { Voxels::$v(values) }
+            fn copy_le_bytes(values: &[Self], out: &mut [u8]) {
+                let (chunks, _) = out.as_chunks_mut::<{ size_of::<$t>() }>();
+                for (chunk, value) in chunks.iter_mut().zip(values) {
+                    *chunk = value.to_le_bytes();
+                }
+            }
         }
         impl From<Vec<$t>> for Voxels {
             fn from(values: Vec<$t>) -> Voxels { Voxels::$v(values) }

@@ -71,6 +71,56 @@ pub trait Chunked {
     }
 }
 
+/// A table as shaders read it, in pages.
+#[derive(Clone, Debug)]
+pub(crate) struct Pages {
+    bytes: Vec<u8>,
+    id: ContentId,
+    pages: Vec<ContentId>,
+}
+
+/// Bytes of a table whose changes are brought to a device together.
+const PAGE_BYTES: usize = 4096;
+
+impl Pages {
+    pub(crate) fn new(bytes: &[u8]) -> Pages {
+        let pages = (0..bytes.len().div_ceil(PAGE_BYTES)).map(|_| ContentId::new()).collect();
+        Pages { bytes: bytes.to_vec(), id: ContentId::new(), pages }
+    }
+
+    /// Pages that are equal to those of a table before it keep their identity.
+    pub(crate) fn follow(&mut self, before: &Pages) {
+        if self.bytes == before.bytes {
+            self.id = before.id;
+        }
+        let pages = self.bytes.chunks(PAGE_BYTES).zip(before.bytes.chunks(PAGE_BYTES));
+        for ((own, (a, b)), id) in self.pages.iter_mut().zip(pages).zip(&before.pages) {
+            if a == b {
+                *own = *id;
+            }
+        }
+    }
+}
+
+impl Chunked for Pages {
+    fn id(&self) -> ContentId {
+        self.id
+    }
+
+    fn chunk_bytes(&self) -> usize {
+        PAGE_BYTES
+    }
+
+    fn n_chunks(&self) -> usize {
+        self.pages.len()
+    }
+
+    fn chunk(&self, i: usize) -> Option<(ContentId, &[u8])> {
+        let start = i * PAGE_BYTES;
+        Some((self.pages[i], &self.bytes[start..self.bytes.len().min(start + PAGE_BYTES)]))
+    }
+}
+
 /// Which chunks of a content a device holds copies of.
 #[derive(Debug, Default)]
 pub struct HeldChunks {

@@ -10,8 +10,8 @@ pub enum Feature {
     EarlyTermination,
     /// Some blocks of the index are empty: rays jump over them.
     SkipEmpty,
-    /// Some macrocells of bricks are dark: rays leap over them.
-    SkipMacrocells,
+    /// Parts of slots are known to be dark, macrocells or all that lies beside a box: rays leap over them.
+    SkipDark,
     /// Tiles of the picture have beams: rays leave out the segments that their beam passes over.
     SkipBesideBeams,
     /// Some slots are coarser than level 0.
@@ -36,7 +36,7 @@ impl Feature {
         Feature::HardwareFilter,
         Feature::EarlyTermination,
         Feature::SkipEmpty,
-        Feature::SkipMacrocells,
+        Feature::SkipDark,
         Feature::SkipBesideBeams,
         Feature::MultiLevel,
         Feature::ShortBlocks,
@@ -53,7 +53,7 @@ impl Feature {
             Feature::HardwareFilter => "hardware_filter",
             Feature::EarlyTermination => "early_termination",
             Feature::SkipEmpty => "skip_empty",
-            Feature::SkipMacrocells => "skip_macrocells",
+            Feature::SkipDark => "skip_dark",
             Feature::SkipBesideBeams => "skip_beside_beams",
             Feature::MultiLevel => "multi_level",
             Feature::ShortBlocks => "short_blocks",

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use brickfield_core::glam::{UVec2, UVec3};
+use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, Companion, TransferFunction};
 use brickfield_optics::{LightSource, Normals, QuadratureRule};
 
 use crate::{
-    Beams, DarkRegions, Division, Feature, FeatureSet, Field, Lighting, Mode, Occupancy, Placement, ProxyGeometry,
-    RayFrame, SampleFormat, Sampling, Slices, Slots, Target, ValueScale,
+    Beams, DarkRegions, Division, Feature, FeatureSet, Field, KeptBoxes, Lighting, Mode, Occupancy, Placement,
+    ProxyGeometry, RayFrame, SampleFormat, Sampling, Slices, Slots, Target, ValueScale,
 };
 
 /// Everything that a backend needs for one frame, and nothing that this frame does not need.
@@ -25,6 +25,7 @@ pub struct FramePlan {
     pub(crate) transfer: TransferFunction,
     pub(crate) lighting: Option<Lighting>,
     pub(crate) occupancy: Option<Arc<Occupancy>>,
+    pub(crate) kept: Option<Arc<KeptBoxes>>,
     pub(crate) beams: Option<Arc<Beams>>,
     pub(crate) proxy: Option<Arc<ProxyGeometry>>,
     pub(crate) features: FeatureSet,
@@ -130,6 +131,7 @@ impl FramePlan {
             transfer,
             lighting,
             occupancy: dark.occupancy().cloned(),
+            kept: dark.kept().cloned(),
             beams: None,
             proxy: None,
             features: FeatureSet::default(),
@@ -160,7 +162,7 @@ impl FramePlan {
             (Feature::HardwareFilter, fast),
             (Feature::EarlyTermination, self.sampling.transmittance_floor() > 0.0),
             (Feature::SkipEmpty, self.field.index().has_empty()),
-            (Feature::SkipMacrocells, self.occupancy.is_some()),
+            (Feature::SkipDark, self.occupancy.is_some() || (self.kept.is_some() && self.proxy.is_none())),
             (Feature::SkipBesideBeams, self.beams.is_some()),
             (Feature::MultiLevel, self.field.has_coarse()),
             (Feature::ShortBlocks, self.field.has_short_blocks()),
@@ -228,6 +230,12 @@ impl FramePlan {
         self.occupancy.as_ref()
     }
 
+    /// The boxes beside which trimmed bricks are dark; `None` where none are known.
+    #[inline]
+    pub fn kept(&self) -> Option<&Arc<KeptBoxes>> {
+        self.kept.as_ref()
+    }
+
     /// Where the rays of each tile may see something; `None` where each finds its own way.
     #[inline]
     pub fn beams(&self) -> Option<&Arc<Beams>> {
@@ -250,6 +258,18 @@ impl FramePlan {
     pub fn block_box(&self, cell: UVec3) -> Aabb {
         let b = self.field.block_box(cell).intersection(&self.domain);
         Aabb { min: b.min - self.rays.center, max: b.max - self.rays.center }
+    }
+
+    /// The part of [`block_box`](Self::block_box) in which segments that see something end: of trimmed bricks the kept box, and as far
+    /// beside it as a segment of length `reach` (in world units) reaches.
+    pub(crate) fn seen_box(&self, cell: UVec3, reach: f64) -> Aabb {
+        let b = self.block_box(cell);
+        let slot = self.field.index().at(cell).slot();
+        let Some((kept, slot)) = self.kept.as_ref().zip(slot) else { return b };
+        let kept = kept.boxes()[slot as usize];
+        let beside = DVec3::splat(reach) / self.rays.planes.voxel_world;
+        let center = self.rays.center;
+        b.intersection(&Aabb { min: kept.min - beside - center, max: kept.max + beside - center })
     }
 
     /// The spreads of the samples, by which nodes are classified: of a field that has spreads, if not all of them are 0 and the transfer

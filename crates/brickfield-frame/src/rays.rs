@@ -42,6 +42,9 @@ pub struct RayFrame {
 
 /// Roundings of a term of a position, times the unit roundoff of f32.
 const ROUNDING: f64 = 8.0 / (1u32 << 24) as f64;
+/// Polygons reach a little beyond the outer pixels' rays.
+const STRETCH_MARGIN: f64 = 1.01;
+
 /// One ray of a [`RayFrame`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanRay {
@@ -142,6 +145,18 @@ impl RayFrame {
             }
             _ => 1.0,
         }
+    }
+
+    /// How much farther than a step a segment may reach along an axis of space.
+    pub(crate) fn greatest_stretch(&self) -> f64 {
+        let last = self.size.max(UVec2::ONE) - 1;
+        let corners = [(0, 0), (last.x, 0), (0, last.y), (last.x, last.y)];
+        let stretch = match self.placement {
+            Placement::ViewportPlanes => corners.map(|(x, y)| self.ray(x, y).stretch).into_iter().fold(1.0, f64::max),
+            // A ray takes the planes across the axis along which it is steepest.
+            Placement::ObjectPlanes | Placement::Shells | Placement::TessellatedShells { .. } => 1.0,
+        };
+        stretch * STRETCH_MARGIN
     }
 
     /// How far f32 may put a position of a pixel's ray from where it is, along each axis, in voxels, for parameters up to `far`.

@@ -47,6 +47,8 @@ pub enum Resource {
     SeenBefore,
     /// Distances of macrocells, negative for visible ones ([`Occupancy`](crate::Occupancy)).
     Occupancy,
+    /// For each slot, the box beside which its block is dark ([`KeptBoxes`](crate::KeptBoxes)).
+    Kept,
     /// For each tile of pixels, the segments in which its rays may see something ([`Beams`](crate::Beams)).
     Beams,
     /// The blocks that polygons are clipped to ([`ProxyGeometry`](crate::ProxyGeometry)).
@@ -71,7 +73,7 @@ pub enum Content<'a> {
 
 impl Resource {
     /// All resources.
-    pub const ALL: [Resource; 23] = [
+    pub const ALL: [Resource; 24] = [
         Resource::Frame,
         Resource::Atlas,
         Resource::AtlasSampler,
@@ -90,6 +92,7 @@ impl Resource {
         Resource::Outputs,
         Resource::SeenBefore,
         Resource::Occupancy,
+        Resource::Kept,
         Resource::Beams,
         Resource::Drawn,
         Resource::Facets,
@@ -118,6 +121,7 @@ impl Resource {
             Resource::Outputs => "outputs",
             Resource::SeenBefore => "seen_before",
             Resource::Occupancy => "occupancy",
+            Resource::Kept => "kept",
             Resource::Beams => "beams",
             Resource::Drawn => "drawn",
             Resource::Facets => "facets",
@@ -150,6 +154,7 @@ impl FramePlan {
             Resource::Knots => bytes(bytemuck::cast_slice(&KnotUniform::of(self))),
             Resource::Light => LightUniform::of(self).and_then(|light| bytes(bytemuck::bytes_of(&light))),
             Resource::Occupancy => self.occupancy.as_ref().map(|occupancy| Content::Chunks(&**occupancy)),
+            Resource::Kept => self.kept.as_ref().map(|kept| Content::Chunks(kept.table())),
             Resource::Beams => self.beams.as_ref().and_then(|beams| bytes(bytemuck::cast_slice(&beams.spans()))),
             Resource::Drawn => {
                 let proxy = self.proxy.as_ref()?;

@@ -6,8 +6,8 @@ use brickfield_core::glam::UVec3;
 use brickfield_core::{Aabb, Companion, TransferFunction};
 
 use crate::{
-    Beams, BlockRanges, Feature, FeatureSet, Field, FramePlan, IndexGrid, Join, Lighting, Occupancy, Overview,
-    ProxyGeometry, RayFrame, Sampling, Slots,
+    Beams, BlockRanges, Feature, FeatureSet, Field, FramePlan, IndexGrid, Join, KeptBoxes, Lighting, Occupancy,
+    Overview, ProxyGeometry, RayFrame, Sampling, Slots,
 };
 
 /// A plan taken apart. It is put together again without validation: the plan may be wrong in any way.
@@ -27,6 +27,7 @@ pub struct SpoiltPlan {
     pub transfer: TransferFunction,
     pub lighting: Option<Lighting>,
     pub occupancy: Option<Arc<Occupancy>>,
+    pub kept: Option<Arc<KeptBoxes>>,
     pub proxy: Option<Arc<ProxyGeometry>>,
     pub features: FeatureSet,
     has_beams: bool,
@@ -35,8 +36,20 @@ pub struct SpoiltPlan {
 impl SpoiltPlan {
     /// The parts of a plan.
     pub fn of(plan: &FramePlan) -> SpoiltPlan {
-        let FramePlan { field, rays, domain, visible, sampling, transfer, lighting, occupancy, beams, proxy, features } =
-            plan.clone();
+        let FramePlan {
+            field,
+            rays,
+            domain,
+            visible,
+            sampling,
+            transfer,
+            lighting,
+            occupancy,
+            kept,
+            beams,
+            proxy,
+            features,
+        } = plan.clone();
         SpoiltPlan {
             dims: field.dims(),
             index: field.index().clone(),
@@ -51,6 +64,7 @@ impl SpoiltPlan {
             transfer,
             lighting,
             occupancy,
+            kept,
             proxy,
             features,
             has_beams: beams.is_some(),
@@ -66,7 +80,9 @@ impl SpoiltPlan {
     /// The plan as it is now. Beams are traced anew: an error shall be seen, not hidden by beams that know better.
     pub fn into_plan(self) -> FramePlan {
         let field = self.field();
-        let SpoiltPlan { rays, domain, visible, sampling, transfer, lighting, occupancy, proxy, features, .. } = self;
+        let SpoiltPlan {
+            rays, domain, visible, sampling, transfer, lighting, occupancy, kept, proxy, features, ..
+        } = self;
         let features = features.without(Feature::SkipBesideBeams);
         let mut plan = FramePlan {
             field,
@@ -77,6 +93,7 @@ impl SpoiltPlan {
             transfer,
             lighting,
             occupancy,
+            kept,
             beams: None,
             proxy,
             features,

@@ -108,7 +108,7 @@ impl ShaderLibrary {
 
 /// Features that only save time, in the order in which they are given up where a device has too few storage buffers. Without
 /// them no pixel changes.
-const GIVEN_UP: [Feature; 2] = [Feature::SkipBesideBeams, Feature::SkipMacrocells];
+const GIVEN_UP: [Feature; 2] = [Feature::SkipBesideBeams, Feature::SkipDark];
 
 impl ShaderLibrary {
     /// As [`specialise`](Self::specialise), for a device that allows so many storage buffers in a stage: where they are too few,

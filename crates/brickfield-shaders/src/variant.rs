@@ -153,8 +153,7 @@ impl Surfaces {
 }
 
 /// The features for which a ray asks the field.
-const READS_FIELD: [Feature; 4] =
-    [Feature::TransferLookup, Feature::SkipEmpty, Feature::SkipMacrocells, Feature::Light];
+const READS_FIELD: [Feature; 4] = [Feature::TransferLookup, Feature::SkipEmpty, Feature::SkipDark, Feature::Light];
 
 /// How the knots of a transfer function are searched.
 ///

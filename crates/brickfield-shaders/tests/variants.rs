@@ -59,7 +59,7 @@ fn variant(options: &[usize; N_OPTIONS]) -> Option<Variant> {
     let is_asked_for = (!is_nominal || variant.rule == QuadratureRule::MidpointExponential)
         && (!matches!(variant.entry, Entry::Proxy(_)) || is_drawn)
         && (variant.entry != Entry::Proxy(Slices::InteriorsFirst) || is_blended)
-        && (variant.field == FieldKind::Bricks || !features.contains(Feature::SkipMacrocells))
+        && (variant.field == FieldKind::Bricks || !features.contains(Feature::SkipDark))
         && (is_of_blocks || !features.contains(Feature::ShortBlocks))
         && (matches!(variant.field, FieldKind::Blocks(_)) || !features.contains(Feature::Prefiltered))
         && (variant.rule != QuadratureRule::PreIntegrated || !features.contains(Feature::Prefiltered))
@@ -187,7 +187,7 @@ fn what_a_scene_does_not_need_is_left_out() {
     assert_eq!(resources(&march(all, rule)), of_general);
     for (feature, resource) in [
         (Feature::HardwareFilter, AtlasSampler),
-        (Feature::SkipMacrocells, Occupancy),
+        (Feature::SkipDark, Occupancy),
         (Feature::SkipBesideBeams, Beams),
         (Feature::Light, Light),
     ] {
@@ -208,7 +208,7 @@ fn what_a_scene_does_not_need_is_left_out() {
     for feature in all.iter().filter(|f| *f != Feature::HardwareFilter) {
         let (with, without) = match feature {
             Feature::ShortBlocks | Feature::Prefiltered => {
-                let features = all.without(Feature::SkipMacrocells);
+                let features = all.without(Feature::SkipDark);
                 (of_blocks(features), of_blocks(features.without(feature)))
             }
             Feature::TransferLookup => (march(unlit, rule), march(unlit.without(feature), rule)),
@@ -223,7 +223,7 @@ fn what_a_scene_does_not_need_is_left_out() {
         ("textureSampleLevel", Feature::HardwareFilter),
         ("fn ended", Feature::EarlyTermination),
         ("resident", Feature::SkipEmpty),
-        ("fn dark_around", Feature::SkipMacrocells),
+        ("fn dark_around", Feature::SkipDark),
         ("let beam", Feature::SkipBesideBeams),
         ("    scale: f32", Feature::MultiLevel),
         ("fn shade_at", Feature::Light),

@@ -140,6 +140,53 @@ pub struct ClassCounts {
 }
 
 impl TrimmedBricks {
+    /// Every brick of a layout whole, whatever may be seen of it.
+    pub fn whole(layout: BrickLayout) -> TrimmedBricks {
+        let whole = |id| SampleBox::whole(brick_samples(&layout, id).n);
+        let kept = layout.bricks(Level(0)).map(whole).collect();
+        TrimmedBricks { layout, interpolation: Interpolation::default(), kept }
+    }
+
+    /// The bricks of which something is kept, whole.
+    #[must_use]
+    pub fn untrimmed(&self) -> TrimmedBricks {
+        let mut all = TrimmedBricks::whole(self.layout);
+        let white = self.kept.iter().zip(&mut all.kept).filter(|(kept, _)| kept.is_empty());
+        white.for_each(|(_, kept)| *kept = SampleBox::EMPTY);
+        all
+    }
+
+    /// The boxes that hold every sample within `reach` of a kept one along each axis, in whichever brick it lies: what gradients and rules
+    /// that look at a segment's two ends read.
+    #[must_use]
+    pub fn grown(&self, reach: u32) -> TrimmedBricks {
+        if reach == 0 {
+            return self.clone();
+        }
+        let layout = self.layout;
+        let of_volume: Vec<Option<[UVec3; 2]>> = layout
+            .bricks(Level(0))
+            .zip(&self.kept)
+            .map(|(id, kept)| {
+                let first = brick_samples(&layout, id).first + kept.first;
+                (!kept.is_empty()).then(|| [first.saturating_sub(UVec3::splat(reach)), first + kept.n + reach])
+            })
+            .collect();
+        let beside = reach.div_ceil(layout.side().n_cells());
+        let grown = |id: BrickId| {
+            let own = brick_samples(&layout, id);
+            let low = id.coords.saturating_sub(UVec3::splat(beside));
+            let high = (id.coords + beside + 1).min(layout.n_bricks(Level(0)));
+            let around = (low.z..high.z)
+                .flat_map(|z| (low.y..high.y).flat_map(move |y| (low.x..high.x).map(move |x| UVec3::new(x, y, z))));
+            let ordinals = around.map(|coords| layout.ordinal(BrickId { coords, ..id }));
+            let boxes = ordinals.filter_map(|i| of_volume[i]);
+            let own_parts = boxes.filter_map(|[from, to]| own.part(from, to));
+            own_parts.reduce(SampleBox::union).unwrap_or_default()
+        };
+        TrimmedBricks { kept: layout.bricks(Level(0)).map(grown).collect(), ..*self }
+    }
+
     /// Which bricks there are.
     pub fn layout(&self) -> &BrickLayout {
         &self.layout

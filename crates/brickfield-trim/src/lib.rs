@@ -20,4 +20,4 @@ pub use merge::{
 };
 pub use pack::{PackError, PackedBoxes, pack_boxes};
 pub use slices::{BoxError, MinMaxArrays, SampleBox};
-pub use stored::{StoredBricks, TexelAccount, VoxelsError, pack_bricks};
+pub use stored::{StoredBricks, TexelAccount, VoxelsError, pack_bricks, store_alone};

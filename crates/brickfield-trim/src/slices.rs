@@ -27,6 +27,18 @@ impl SampleBox {
         self.n.cmpeq(UVec3::ZERO).any()
     }
 
+    /// The samples of this box from `from` to before `to`, counted from its first one; `None` if there are none.
+    pub(crate) fn part(&self, from: UVec3, to: UVec3) -> Option<SampleBox> {
+        let (low, high) = (from.max(self.first), to.min(self.first + self.n));
+        low.cmplt(high).all().then(|| SampleBox { first: low - self.first, n: high - low })
+    }
+
+    /// The least box around two that are not empty.
+    pub(crate) fn union(self, other: SampleBox) -> SampleBox {
+        let first = self.first.min(other.first);
+        SampleBox { first, n: (self.first + self.n).max(other.first + other.n) - first }
+    }
+
     /// Number of samples.
     pub fn n_samples(&self) -> u64 {
         self.n.as_u64vec3().element_product()

@@ -3,6 +3,7 @@
 use brickfield_core::glam::UVec3;
 use brickfield_core::{Axes, BrickId, BrickLayout, Level, Place};
 
+use crate::merge::alone;
 use crate::{PackError, SampleBox, TrimmedBricks, brick_samples, pack_boxes};
 
 /// Trimmed bricks in one texture: for each brick with something to see, the place of its samples in the texture and in space.
@@ -64,12 +65,25 @@ pub fn pack_bricks(trimmed: &TrimmedBricks, most: UVec3) -> Result<StoredBricks,
         .iter()
         .map(|kept| (!kept.is_empty()).then(|| Part { samples: *kept, axes: longest_first(kept.n) }))
         .collect();
+    pack_parts(*trimmed.layout(), &parts, most)
+}
+
+/// Trims each brick along its trimming axis, which becomes the texture's z, and stores it on its own: bricks before they are merged.
+///
+/// # Errors
+/// As [`pack_bricks`].
+pub fn store_alone(trimmed: &TrimmedBricks, most: UVec3) -> Result<StoredBricks, PackError> {
+    let parts: Vec<Option<Part>> = trimmed.layout().bricks(Level(0)).map(|id| alone(trimmed, id)).collect();
+    pack_parts(*trimmed.layout(), &parts, most)
+}
+
+fn pack_parts(layout: BrickLayout, parts: &[Option<Part>], most: UVec3) -> Result<StoredBricks, PackError> {
     let boxes: Vec<UVec3> = parts.iter().flatten().map(Part::n).collect();
     let packed = pack_boxes(&boxes, most)?;
     let mut origins = packed.origins.iter();
     let texels = parts.iter().map(|part| part.as_ref().and_then(|_| origins.next().copied()).unwrap_or_default());
     let texels: Vec<UVec3> = texels.collect();
-    Ok(StoredBricks::new(*trimmed.layout(), packed.texels, |brick| parts[brick].map(|part| (part, texels[brick]))))
+    Ok(StoredBricks::new(layout, packed.texels, |brick| parts[brick].map(|part| (part, texels[brick]))))
 }
 
 /// A part of a brick, and which of its axes each axis of the texture runs along.

@@ -92,7 +92,7 @@ fn skipping_changes_no_bit() {
 #[test]
 fn every_variant_renders_what_the_general_one_renders() {
     let Some(mut backend) = backend() else { return };
-    let of_maps = [Feature::SkipMacrocells, Feature::SkipBesideBeams];
+    let of_maps = [Feature::SkipDark, Feature::SkipBesideBeams];
     let of_light = [Feature::Light, Feature::LightBesideEye, Feature::StoredGradients];
     let unneeded = [Feature::HardwareFilter, Feature::EarlyTermination].into_iter().chain(of_maps).chain(of_light);
     let general = unneeded.fold(FeatureSet::all(), FeatureSet::without);

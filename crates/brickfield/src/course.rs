@@ -56,12 +56,17 @@ pub(crate) fn segment_reach(grid: &Grid, scene: &Scene, n_cells: u32) -> u32 {
     if scene.rule != QuadratureRule::PreIntegrated || scene.division == Division::Brick {
         return 0;
     }
+    voxels_in_step(grid, scene).div_ceil(n_cells)
+}
+
+/// How many voxels a segment can span along an axis, rounded up.
+pub(crate) fn voxels_in_step(grid: &Grid, scene: &Scene) -> u32 {
     // A sheared direction matrix can make a world step longer in voxels than the spacing says: take the map's own norm.
     let turn = grid.world_to_index().matrix3;
     let voxels_per_unit =
         [turn.x_axis, turn.y_axis, turn.z_axis].into_iter().map(DVec3::length_squared).sum::<f64>().sqrt();
     let voxels = scene.quality.step(scene.step_voxels) * grid.spacing().min_element() * voxels_per_unit;
-    (voxels / f64::from(n_cells)).ceil().min(f64::from(u32::MAX)) as u32
+    voxels.ceil().min(f64::from(u32::MAX)) as u32
 }
 
 fn check_segments(n_segments: f64) -> Result<(), PrepareError> {

@@ -13,6 +13,7 @@ mod residency;
 mod scene;
 #[cfg(feature = "formats")]
 mod store;
+mod trimmed;
 mod viewpoint;
 mod visibility;
 
@@ -32,6 +33,7 @@ pub use brickfield_interp as interp;
 pub use brickfield_io as io;
 pub use brickfield_lod as lod;
 pub use brickfield_optics as optics;
+pub use brickfield_trim as trim;
 #[cfg(feature = "formats")]
 pub use pack::{PackError, PackProgress, Packed, pack};
 pub use picture::{PictureError, PictureFormat, check_picture_path, srgb8, write_exr, write_picture, write_png};
@@ -40,4 +42,5 @@ pub use residency::{Copied, Residency};
 pub use scene::{Quality, Scene, Skipping, Technique};
 #[cfg(feature = "formats")]
 pub use store::{StoreBlocks, StoreLimits, SummaryProgress};
+pub use trimmed::{PrepareTrimmedError, TrimResidency, TrimmedVolume, Trimming, prepare_trimmed};
 pub use viewpoint::{Viewpoint, ViewpointError};

@@ -2,7 +2,7 @@
 
 use brickfield_bricks::BrickTree;
 use brickfield_core::glam::{UVec2, UVec3};
-use brickfield_core::{Aabb, BrickId, BrickLayout, Level, ValueRange};
+use brickfield_core::{Aabb, BrickId, BrickLayout, Grid, Level, ValueRange};
 use brickfield_frame::{
     DarkRegions, Drawing, FramePlan, IndexEntry, Lighting, Placement, PlacementError, PlanError, PlanParts, RayFrame,
     SamplingError, Slices,
@@ -119,7 +119,7 @@ fn plan_selection(
     let drawing = match scene.technique {
         Technique::RayCasting => Drawing::Rays,
         Technique::Polygons(target) => {
-            check_polygons(tree, &rays, sampling.step_world(), resident.len())?;
+            check_polygons(tree.layout(), tree.grid(), &rays, sampling.step_world(), resident.len())?;
             Drawing::Polygons {
                 back_to_front: from_back_to_front(tree, scene, &resident),
                 target,
@@ -145,15 +145,21 @@ fn from_back_to_front(tree: &BrickTree, scene: &Scene, bricks: &[BrickId]) -> Ve
 }
 
 /// A brick is as many steps long at every level.
-fn check_polygons(tree: &BrickTree, rays: &RayFrame, step_world: f64, n_bricks: usize) -> Result<(), PrepareError> {
+pub(crate) fn check_polygons(
+    layout: &BrickLayout,
+    grid: &Grid,
+    rays: &RayFrame,
+    step_world: f64,
+    n_bricks: usize,
+) -> Result<(), PrepareError> {
     const FACES: f64 = 6.0;
-    let voxel = tree.grid().world_box().extent() / tree.grid().dims().as_dvec3();
+    let voxel = grid.world_box().extent() / grid.dims().as_dvec3();
     let across = match rays.placement {
         // Three stacks, each across an axis.
         Placement::ObjectPlanes => voxel.element_sum(),
         _ => voxel.length(),
     };
-    let surfaces = across * f64::from(tree.layout().side().n_cells()) / step_world;
+    let surfaces = across * f64::from(layout.side().n_cells()) / step_world;
     let of_facets = match rays.placement {
         Placement::TessellatedShells { .. } => f64::from(rays.n_facets()) * rays.n_segments,
         _ => 0.0,

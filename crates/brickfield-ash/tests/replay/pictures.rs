@@ -32,7 +32,7 @@ fn a_homogeneous_slab_has_its_closed_form_in_every_rule() {
     for rule in QuadratureRule::ALL.into_iter().filter(|r| *r != QuadratureRule::LeftRiemann) {
         let plan = plan(ramp(SampleFormat::Unorm8), transfer.clone(), rule, Mode::Exact);
         // Nothing is dark here, and the plan has neither a map of macrocells nor beams nor light.
-        let unneeded = [Feature::HardwareFilter, Feature::SkipMacrocells, Feature::SkipBesideBeams];
+        let unneeded = [Feature::HardwareFilter, Feature::SkipDark, Feature::SkipBesideBeams];
         let of_light = [Feature::Light, Feature::LightBesideEye, Feature::StoredGradients];
         let general = unneeded.into_iter().chain(of_light).fold(FeatureSet::all(), FeatureSet::without);
         for plan in [&plan, &with_features(&plan, general)] {

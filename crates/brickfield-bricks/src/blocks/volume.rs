@@ -4,14 +4,13 @@ use std::sync::Arc;
 
 use brickfield_core::glam::UVec3;
 use brickfield_core::{
-    BlockLayout, BlockSummary, Companion, Grid, Level, Rescale, ScalarType, ValueRange, Volume, with_voxels,
+    BlockLayout, BlockSummary, Companion, Grid, Level, Rescale, Scalar, ScalarType, ValueRange, Volume, with_voxels,
 };
 
 use super::gradient::{Voxels, gradient_codes};
 use super::shrink::BlockVoxels;
 use super::source::{BlockSource, FetchError, SourceId, greatest_gradient};
 use super::spread::spread_codes;
-use crate::sample::BrickScalar;
 
 /// A volume as flat blocks of every resolution (Ljung, Lundstroem and Ynnerman 2006, section 3.1).
 ///
@@ -46,7 +45,7 @@ impl BlockVolume {
             let rows = BlockVoxels::new(v, &self.layout, block).rows();
             let n_row_bytes = self.layout.extent(block).x as usize * self.scalar_type().n_bytes();
             for (row, out) in rows.zip(out.chunks_exact_mut(n_row_bytes)) {
-                BrickScalar::copy_le_bytes(row, out);
+                Scalar::copy_le_bytes(row, out);
             }
         });
     }
@@ -70,7 +69,7 @@ impl BlockVolume {
     fn copy_averages(&self, block: UVec3, level: Level, n: usize, out: &mut [u8]) {
         let below: usize = (1..level.0).map(|l| self.layout.n_samples_total(block, Level(l)) as usize).sum();
         let start = n_before(&self.layout, block) + below;
-        with_voxels!(&self.averages, v => BrickScalar::copy_le_bytes(&v[start..start + n], out));
+        with_voxels!(&self.averages, v => Scalar::copy_le_bytes(&v[start..start + n], out));
     }
 }
 

@@ -69,8 +69,19 @@ impl<'a> Path<'a> {
         }
     }
 
+    /// The position of a point in segment `k` relative to the plan's centre, from 0 at its near end to 1, if it is not cut.
+    pub(super) fn position(&self, k: i64, along: f64) -> DVec3 {
+        self.ray.at((k as f64 + along) * self.step)
+    }
+
+    /// How many whole segments from `k` on have the point `along` of theirs before a parameter of the ray.
+    pub(super) fn n_before(&self, k: i64, along: f64, parameter: f64) -> i64 {
+        let n = ((parameter * self.per_unit - along).ceil() - k as f64).min(MOST as f64) as i64;
+        n.min(self.end - 1 - k)
+    }
+
     /// Whether segment `k` is not cut.
-    fn is_whole(&self, k: i64) -> bool {
+    pub(super) fn is_whole(&self, k: i64) -> bool {
         self.first < k && k < self.end - 1
     }
 }
@@ -191,7 +202,7 @@ fn run<const N: usize, S: Stored>(
 ) -> i64 {
     let t = (k as f64 + near) * path.step;
     let block = plan32.block(plan32.center + path.ray.at(t));
-    let exit = exit(plan32, path, &block);
+    let exit = exit(path, plan32.center, (block.low, block.high));
     let n = ((exit * path.per_unit - far).ceil() - k as f64).min((to.min(path.end - 1) - k).min(MOST) as f64) as i32;
     if let (IndexEntry::Resident { slot, reach }, true) = (block.entry, n > 0) {
         Resident { block: &block, slot, level: reach.level_of_brick() }.run(plan32, path, k, (near, far), n, state);
@@ -241,14 +252,14 @@ impl Resident<'_> {
     }
 }
 
-/// Where the ray leaves a block.
+/// Where the ray leaves a box in sample space.
 #[inline(always)]
-fn exit<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, path: &Path, block: &Block) -> f64 {
-    let origin = path.ray.anchor + plan32.center;
+pub(super) fn exit(path: &Path, center: DVec3, (low, high): (DVec3, DVec3)) -> f64 {
+    let origin = path.ray.anchor + center;
     let mut exit = f64::INFINITY;
     for axis in 0..3 {
         let d = path.ray.direction[axis];
-        let face = if d > 0.0 { block.high[axis] } else { block.low[axis] };
+        let face = if d > 0.0 { high[axis] } else { low[axis] };
         if d != 0.0 {
             exit = exit.min((face - origin[axis]) * path.reciprocal[axis]);
         }

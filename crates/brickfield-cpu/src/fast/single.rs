@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use brickfield_core::Level;
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_frame::{Division, PlanRay};
+use brickfield_core::{Aabb, Level};
+use brickfield_frame::{Division, FramePlan, PlanRay};
 
 use super::Renderer;
 use super::classify::Optics32;
@@ -24,10 +24,20 @@ pub(super) fn pixel(renderer: &impl Renderer, ray: &PlanRay, runs: &[Range<i64>]
     match plan.sampling().division() {
         Division::Ray => {
             let path = Path::new(plan.sampling(), ray, span, Level(0));
-            for k in runs.iter().flat_map(|run| path.first.max(run.start)..path.end.min(run.end)) {
-                state.push(one(renderer, lamp.as_ref(), &path, k, |q| plan.field().cell_at(q)));
-                if has_ended(&state) {
-                    break;
+            for run in runs {
+                let (mut k, end) = (path.first.max(run.start), path.end.min(run.end));
+                let mut seen_until = k;
+                while k < end && !has_ended(&state) {
+                    if k >= seen_until {
+                        let (n, is_dark) = alike(plan, &path, k);
+                        if is_dark && n > 0 {
+                            k += n;
+                            continue;
+                        }
+                        seen_until = k + n.max(1);
+                    }
+                    state.push(one(renderer, lamp.as_ref(), &path, k, |q| plan.field().cell_at(q)));
+                    k += 1;
                 }
             }
         }
@@ -45,6 +55,41 @@ pub(super) fn pixel(renderer: &impl Renderer, ray: &PlanRay, runs: &[Range<i64>]
         }
     }
     state.rgba(lamp.map_or(1.0, |lamp| lamp.brightest()))
+}
+
+/// How many segments from `k` on have all their nodes in one region that is dark, or in one that may not be; and which it is.
+fn alike(plan: &FramePlan, path: &Path, k: i64) -> (i64, bool) {
+    if !path.is_whole(k) {
+        return (0, false);
+    }
+    let nodes = plan.sampling().rule().nodes();
+    let (near, far) = (nodes[0], nodes[nodes.len() - 1]);
+    let center = plan.rays().center;
+    let (region, is_dark) = region_at(plan, center + path.position(k, near));
+    (path.n_before(k, far, march::exit(path, center, (region.min, region.max))), is_dark)
+}
+
+/// A region around a sample position: all of it dark, or none of it known to be.
+fn region_at(plan: &FramePlan, q: DVec3) -> (Aabb, bool) {
+    let field = plan.field();
+    let cell = field.cell_at(q);
+    let mut region = field.block_box(cell);
+    let Some(slot) = field.index().at(cell).slot() else { return (region, true) };
+    let Some(kept) = plan.kept().map(|kept| kept.boxes()[slot as usize]) else { return (region, false) };
+    let in_region = |p: DVec3| p.clamp(region.min, region.max);
+    let kept = Aabb { min: in_region(kept.min), max: in_region(kept.max) };
+    // Beside one pair of the box's faces, the slab that the position lies in.
+    for axis in 0..3 {
+        if q[axis] < kept.min[axis] {
+            region.max[axis] = kept.min[axis];
+            return (region, true);
+        }
+        if q[axis] > kept.max[axis] {
+            region.min[axis] = kept.max[axis];
+            return (region, true);
+        }
+    }
+    (kept, false)
 }
 
 /// One segment; its nodes lie in the blocks around these index cells.

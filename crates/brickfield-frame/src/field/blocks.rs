@@ -4,8 +4,9 @@ use brickfield_core::glam::UVec3;
 use brickfield_core::{BlockLayout, Interblock, Level, Place};
 
 use super::SlotsError;
-use super::slots::{PlaceTable, check_inside};
+use super::slots::check_inside;
 use crate::Chunked;
+use crate::content::Pages;
 
 /// Flat blocks in a texture: for each block its level and its first texel, the rest is arithmetic (Ljung, Lundstroem and Ynnerman
 /// 2006, section 4, equation 12).
@@ -46,13 +47,13 @@ const ONE_SAMPLE: u32 = 1 << 31;
 #[derive(Clone, Debug)]
 pub struct BlockRanges {
     reads: Vec<[f32; 2]>,
-    table: PlaceTable,
+    table: Pages,
 }
 
 impl BlockRanges {
     /// The ranges of blocks, by number.
     pub fn new(reads: Vec<[f32; 2]>) -> BlockRanges {
-        BlockRanges { table: PlaceTable::new(bytemuck::cast_slice(&reads)), reads }
+        BlockRanges { table: Pages::new(bytemuck::cast_slice(&reads)), reads }
     }
 
     /// Least and greatest, by the blocks' numbers.

@@ -6,6 +6,7 @@ use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{BrickSide, Level, Place, Rescale, ScalarType, ValueRange};
 
 use super::{BlockPlaces, BlockSamples};
+use crate::content::Pages;
 use crate::{Chunk, Chunked, ContentId, PlaceUniform};
 
 /// How a sample is stored for a backend.
@@ -136,22 +137,11 @@ pub struct Slots {
     decode: Decode,
     places: Places,
     samples: Vec<Option<Arc<Chunk>>>,
-    table: Option<PlaceTable>,
+    table: Option<Pages>,
     /// Of companions: the texel of each block that is one sample.
     ones: Option<Vec<u32>>,
     id: ContentId,
 }
-
-/// A table of places as shaders read it, in pages.
-#[derive(Clone, Debug)]
-pub(super) struct PlaceTable {
-    bytes: Vec<u8>,
-    id: ContentId,
-    pages: Vec<ContentId>,
-}
-
-/// Bytes of a table whose changes are brought to a device together.
-const PAGE_BYTES: usize = 4096;
 
 /// Slots are equal if their samples are.
 impl PartialEq for Slots {
@@ -223,9 +213,9 @@ impl Slots {
             Places::Even(_) => None,
             Places::Table { places, .. } => {
                 let rows: Vec<PlaceUniform> = places.iter().map(PlaceUniform::of).collect();
-                Some(PlaceTable::new(bytemuck::cast_slice(&rows)))
+                Some(Pages::new(bytemuck::cast_slice(&rows)))
             }
-            Places::Blocks(places) => Some(PlaceTable::new(bytemuck::cast_slice(&places.packed()))),
+            Places::Blocks(places) => Some(Pages::new(bytemuck::cast_slice(&places.packed()))),
         };
         Ok(Slots { format, decode, places, samples, table, ones: None, id: ContentId::new() })
     }
@@ -247,7 +237,7 @@ impl Slots {
         check_number(places.rows().len(), samples.len())?;
         check_number(places.rows().len(), ones.len())?;
         check_bytes(&samples, |slot| places.n_texels(slot) * format.n_bytes())?;
-        let (places, table) = (self.places.clone(), Some(PlaceTable::new(bytemuck::cast_slice(&ones))));
+        let (places, table) = (self.places.clone(), Some(Pages::new(bytemuck::cast_slice(&ones))));
         Ok(Slots { format, decode, places, samples, table, ones: Some(ones), id: ContentId::new() })
     }
 
@@ -433,44 +423,6 @@ impl Chunked for Slots {
 
     fn chunk(&self, i: usize) -> Option<(ContentId, &[u8])> {
         self.samples[i].as_ref().map(|chunk| (chunk.id(), chunk.bytes()))
-    }
-}
-
-impl PlaceTable {
-    pub(super) fn new(bytes: &[u8]) -> PlaceTable {
-        let pages = (0..bytes.len().div_ceil(PAGE_BYTES)).map(|_| ContentId::new()).collect();
-        PlaceTable { bytes: bytes.to_vec(), id: ContentId::new(), pages }
-    }
-
-    fn follow(&mut self, before: &PlaceTable) {
-        if self.bytes == before.bytes {
-            self.id = before.id;
-        }
-        let pages = self.bytes.chunks(PAGE_BYTES).zip(before.bytes.chunks(PAGE_BYTES));
-        for ((own, (a, b)), id) in self.pages.iter_mut().zip(pages).zip(&before.pages) {
-            if a == b {
-                *own = *id;
-            }
-        }
-    }
-}
-
-impl Chunked for PlaceTable {
-    fn id(&self) -> ContentId {
-        self.id
-    }
-
-    fn chunk_bytes(&self) -> usize {
-        PAGE_BYTES
-    }
-
-    fn n_chunks(&self) -> usize {
-        self.pages.len()
-    }
-
-    fn chunk(&self, i: usize) -> Option<(ContentId, &[u8])> {
-        let start = i * PAGE_BYTES;
-        Some((self.pages[i], &self.bytes[start..self.bytes.len().min(start + PAGE_BYTES)]))
     }
 }
 

@@ -45,27 +45,33 @@ pub(super) fn outlines(plan: &FramePlan, projector: &Projector<'_>, cell: UVec3)
         return Vec::new();
     }
     let step = plan.sampling.step_world() * f64::from(plan.field.level_at(cell).stride());
+    let seen = plan.seen_box(cell, step * plan.rays.greatest_stretch());
+    if seen.is_empty() {
+        return Vec::new();
+    }
     let mut outlines = match plan.sampling.lengths() {
-        Lengths::True => exits(plan, projector, &b),
+        Lengths::True => exits(plan, projector, &b, &seen),
         Lengths::Nominal => Vec::new(),
     };
     // f32 may put a surface into the brick that lies beside it.
-    let near = Aabb { min: b.min - projector.rounding(), max: b.max + projector.rounding() };
-    for stack in stacks(plan, projector, &b) {
+    let near = Aabb { min: seen.min - projector.rounding(), max: seen.max + projector.rounding() };
+    for stack in stacks(plan, projector, &seen) {
         outlines.extend(stack.outlines(plan, projector, &near, step));
     }
     outlines.retain(|o| !o.points.is_empty());
     outlines
 }
 
-/// The faces through which rays leave a box.
-fn exits(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb) -> Vec<Outline> {
+/// The faces through which rays leave a box, as far as segments that end there see something.
+fn exits(plan: &FramePlan, projector: &Projector<'_>, b: &Aabb, seen: &Aabb) -> Vec<Outline> {
     let forward = plan.rays.direction[0];
     let off = projector.rounding();
     let leaves_up = |axis: usize| projector.eye().map_or(forward[axis] > 0.0, |e| e[axis] < b.max[axis] + off[axis]);
     let leaves_down = |axis: usize| projector.eye().map_or(forward[axis] < 0.0, |e| e[axis] > b.min[axis] - off[axis]);
-    let up = (0..3).filter(|axis| leaves_up(*axis)).map(|axis| (2 * axis + 1, face(b, axis, b.max[axis])));
-    let down = (0..3).filter(|axis| leaves_down(*axis)).map(|axis| (2 * axis, face(b, axis, b.min[axis])));
+    let is_seen_up = |axis: &usize| leaves_up(*axis) && seen.max[*axis] == b.max[*axis];
+    let is_seen_down = |axis: &usize| leaves_down(*axis) && seen.min[*axis] == b.min[*axis];
+    let up = (0..3).filter(is_seen_up).map(|axis| (2 * axis + 1, face(seen, axis, b.max[axis])));
+    let down = (0..3).filter(is_seen_down).map(|axis| (2 * axis, face(seen, axis, b.min[axis])));
     let outline = |(owner, polygon): (usize, Vec<DVec3>)| Outline {
         points: projector.project(&polygon, projector.window()),
         surface: ProxyCorner::EXIT,

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{Occupancy, Overview};
-use crate::{Chunked, ContentId, Field};
+use super::{KeptBoxes, Occupancy, Overview};
+use crate::{Chunked, ContentId, Field, Places};
 
 /// The regions of a field that are dark under a transfer function; shared between frames. To leave them out changes no sample.
 #[derive(Clone, Debug, Default)]
@@ -12,9 +12,10 @@ pub struct DarkRegions {
     of: Option<[ContentId; 2]>,
     occupancy: Option<Arc<Occupancy>>,
     overview: Option<Arc<Overview>>,
+    kept: Option<Arc<KeptBoxes>>,
 }
 
-/// An occupancy of another field.
+/// Regions of another field.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)]
@@ -23,6 +24,8 @@ pub enum DarkError {
     NoDistances { slot: u32 },
     #[error("distances of macrocells in bricks of {side} samples, for a field of other slots")]
     OtherBricks { side: u32 },
+    #[error("{n_boxes} boxes of trimmed bricks for a field of {n_slots} slots that a table has")]
+    OtherBoxes { n_boxes: usize, n_slots: u32 },
 }
 
 impl DarkRegions {
@@ -38,7 +41,7 @@ impl DarkRegions {
         let Some(side) = field.slots().brick_side() else {
             return match occupancy {
                 Some(o) => Err(DarkError::OtherBricks { side: o.side().n_samples() }),
-                None => Ok(DarkRegions { of, occupancy: None, overview: None }),
+                None => Ok(DarkRegions { of, ..DarkRegions::default() }),
             };
         };
         if let Some(occupancy) = &occupancy {
@@ -50,7 +53,22 @@ impl DarkRegions {
             }
         }
         let overview = Overview::of(side, field.index(), occupancy.as_deref()).map(Arc::new);
-        Ok(DarkRegions { of, occupancy, overview })
+        Ok(DarkRegions { of, occupancy, overview, kept: None })
+    }
+
+    /// The dark regions of a field of trimmed bricks: the empty blocks of its index, and in others all that lies beside their boxes.
+    ///
+    /// # Errors
+    /// If the field's slots have no table of places, or there is not one box for each.
+    pub fn beside_boxes(field: &Field, kept: Arc<KeptBoxes>) -> Result<DarkRegions, DarkError> {
+        let n_slots = match field.slots().places() {
+            Places::Table { .. } => field.slots().n_slots(),
+            Places::Even(_) | Places::Blocks(_) => 0,
+        };
+        if kept.boxes().len() != n_slots as usize {
+            return Err(DarkError::OtherBoxes { n_boxes: kept.boxes().len(), n_slots });
+        }
+        Ok(DarkRegions { of: Some(DarkRegions::key(field)), kept: Some(kept), ..DarkRegions::default() })
     }
 
     /// Whether the regions are of this field. The default, without any region, is of every field.
@@ -61,6 +79,11 @@ impl DarkRegions {
     /// The macrocells that are dark, if any are known to be.
     pub fn occupancy(&self) -> Option<&Arc<Occupancy>> {
         self.occupancy.as_ref()
+    }
+
+    /// The boxes beside which trimmed bricks are dark, if they are known.
+    pub fn kept(&self) -> Option<&Arc<KeptBoxes>> {
+        self.kept.as_ref()
     }
 
     /// The distances over the whole field, if anything is known to be dark.

@@ -3,10 +3,12 @@
 mod beams;
 mod chebyshev;
 mod dark;
+mod kept;
 mod macrocells;
 mod occupancy;
 
 pub use beams::{Beams, Overview};
 pub use dark::{DarkError, DarkRegions};
+pub use kept::KeptBoxes;
 pub use macrocells::MacrocellRanges;
 pub use occupancy::{MACROCELL_SIDE, Occupancy};

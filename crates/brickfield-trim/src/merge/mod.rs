@@ -159,7 +159,7 @@ pub fn merge_bricks(trimmed: &TrimmedBricks, options: &MergeOptions) -> Result<M
 }
 
 /// What is stored of a brick, with its trimming axis along the texture's z; nothing of a white one.
-fn alone(trimmed: &TrimmedBricks, id: BrickId) -> Option<Part> {
+pub(crate) fn alone(trimmed: &TrimmedBricks, id: BrickId) -> Option<Part> {
     let ordinal = trimmed.layout().ordinal(id);
     let (kept, n) = (trimmed.kept()[ordinal], brick_samples(trimmed.layout(), id).n);
     match trimmed.class(ordinal) {

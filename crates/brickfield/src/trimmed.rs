@@ -1,0 +1,362 @@
+//! From a scene and trimmed bricks to a frame plan.
+
+use std::sync::Arc;
+
+use brickfield_bricks::SourceId;
+use brickfield_core::glam::{DVec3, UVec3};
+use brickfield_core::{Aabb, BrickId, BrickLayout, BrickSide, Grid, Level, Place, Scalar, Volume, with_voxels};
+use brickfield_frame::{
+    Chunk, DarkRegions, Drawing, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, KeptBoxes, Lighting,
+    Places, PlanError, PlanParts, QuadratureRule, Reach, SampleFormat, Slices, Slots,
+};
+use brickfield_lod::back_to_front;
+use brickfield_trim::{
+    BrickArrays, ClassCounts, DarkValues, Interpolation, MergeError, MergeOptions, PackError, StoredBricks,
+    TexelAccount, TrimmedBricks, brick_samples, merge_bricks, pack_bricks, reclassify, store_alone, trim_bricks,
+};
+use rayon::prelude::*;
+
+use crate::course::{Course, to_sample_space, voxels_in_step};
+use crate::encode::encode;
+use crate::prepare::{check_polygons, check_size, check_values};
+use crate::{Copied, PrepareError, Scene, Technique};
+
+/// A volume whose bricks of level 0 are classified slice by slice (Tong, Wang, Tsang and Tang 1999, section 3.2.1).
+#[derive(Debug)]
+pub struct TrimmedVolume {
+    id: SourceId,
+    volume: Arc<Volume>,
+    arrays: BrickArrays,
+}
+
+impl TrimmedVolume {
+    /// The min-max arrays of a volume's bricks. Runs on rayon's current thread pool.
+    pub fn new(volume: Arc<Volume>, side: BrickSide) -> TrimmedVolume {
+        TrimmedVolume { id: SourceId::unique(), arrays: BrickArrays::of_volume(&volume, side), volume }
+    }
+
+    /// The volume.
+    pub fn volume(&self) -> &Arc<Volume> {
+        &self.volume
+    }
+
+    /// The min-max arrays.
+    pub fn arrays(&self) -> &BrickArrays {
+        &self.arrays
+    }
+
+    /// Which bricks there are.
+    pub fn layout(&self) -> &BrickLayout {
+        self.arrays.layout()
+    }
+
+    fn grid(&self) -> &Grid {
+        self.volume.grid()
+    }
+}
+
+/// Which samples of bricks are brought to a device, and which of them are drawn. The picture is the same.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Trimming {
+    /// Every brick is stored whole and drawn whole: the paper's algorithm I.
+    Conventional,
+    /// Every brick is stored whole; the boxes around visible samples are drawn: the paper's algorithm II.
+    Envelope,
+    /// Bricks of which something may be seen are stored whole and drawn whole.
+    Visible,
+    /// Bricks are trimmed along one axis, each on its own; their boxes are drawn: the paper's algorithm III.
+    Alone,
+    /// The same, merged into texture chunks: the paper's algorithm IV.
+    Merged(MergeOptions),
+    /// All three axes are trimmed, and the boxes packed.
+    Packed,
+}
+
+impl Trimming {
+    /// Whether the boxes of bricks are drawn, and not the whole bricks.
+    fn draws_boxes(self) -> bool {
+        !matches!(self, Trimming::Conventional | Trimming::Visible)
+    }
+}
+
+/// Why trimmed bricks could not be prepared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum PrepareTrimmedError {
+    #[error(transparent)]
+    Prepare(#[from] PrepareError),
+    #[error("merging trimmed bricks: {0}")]
+    Merge(#[from] MergeError),
+    #[error("storing trimmed bricks: {0}")]
+    Pack(#[from] PackError),
+}
+
+impl From<PlanError> for PrepareTrimmedError {
+    fn from(error: PlanError) -> PrepareTrimmedError {
+        PrepareTrimmedError::Prepare(error.into())
+    }
+}
+
+/// The trimmed bricks of the last frame, in one texture.
+///
+/// An edit of the transfer function classifies every brick again, and gathers the samples of bricks whose box or place is another one.
+/// One residency serves one volume at a time: handed another, it begins anew.
+#[derive(Debug, Default)]
+pub struct TrimResidency {
+    held: Option<Held>,
+    copied: Copied,
+    n_reclassified: usize,
+}
+
+#[derive(Debug)]
+struct Held {
+    source: SourceId,
+    trimming: Trimming,
+    reach: u32,
+    dark: DarkValues,
+    trimmed: TrimmedBricks,
+    stored: StoredBricks,
+    /// By brick.
+    chunks: Vec<Option<Arc<Chunk>>>,
+    slots: Arc<Slots>,
+    kept: Arc<KeptBoxes>,
+    index: Option<Arc<IndexGrid>>,
+}
+
+/// Texels along a side of the texture: every Vulkan device takes so many.
+const MAX_TEXELS: UVec3 = UVec3::splat(2048);
+
+impl TrimResidency {
+    /// The bricks whose samples the last frame gathered.
+    pub fn copied(&self) -> Copied {
+        self.copied
+    }
+
+    /// How many bricks had another class or box than in the frame before; all of a new volume.
+    pub fn n_reclassified(&self) -> usize {
+        self.n_reclassified
+    }
+
+    /// Texels of the texture, and those of them that hold a sample.
+    pub fn account(&self) -> TexelAccount {
+        self.held.as_ref().map(|held| held.stored.account()).unwrap_or_default()
+    }
+
+    /// The classes of all bricks.
+    pub fn counts(&self) -> ClassCounts {
+        self.held.as_ref().map(|held| held.trimmed.counts()).unwrap_or_default()
+    }
+
+    fn hold(
+        &mut self,
+        source: &TrimmedVolume,
+        scene: &Scene,
+        trimming: Trimming,
+        reach: u32,
+    ) -> Result<&mut Held, PrepareTrimmedError> {
+        (self.copied, self.n_reclassified) = (Copied::default(), 0);
+        let dark = DarkValues::of(&scene.transfer);
+        let is_kept = |held: &Held| (held.source, held.trimming, held.reach) == (source.id, trimming, reach);
+        let before = self.held.take().filter(is_kept);
+        let (trimmed, n_changed) = match &before {
+            Some(held) if held.dark == dark => (held.trimmed.clone(), 0),
+            Some(held) => {
+                let mut trimmed = held.trimmed.clone();
+                let changed = reclassify(&mut trimmed, &source.arrays, &dark).expect("bricks of the same volume");
+                (trimmed, changed.len())
+            }
+            None => (trim_bricks(&source.arrays, &dark, Interpolation::Trilinear), source.arrays.arrays().len()),
+        };
+        self.n_reclassified = n_changed;
+        let held = match before {
+            Some(held) if n_changed == 0 => Held { dark, ..held },
+            before => {
+                let stored = match store(&trimmed, trimming, reach) {
+                    Ok(stored) => stored,
+                    Err(error) => {
+                        self.held = before;
+                        return Err(error);
+                    }
+                };
+                let (held, copied) = Held::new(source, (trimming, reach), dark, trimmed, stored, before);
+                self.copied = copied;
+                held
+            }
+        };
+        Ok(self.held.insert(held))
+    }
+}
+
+/// Where the samples of bricks are stored that are read within `reach` samples of visible ones.
+fn store(trimmed: &TrimmedBricks, trimming: Trimming, reach: u32) -> Result<StoredBricks, PrepareTrimmedError> {
+    let grown = || trimmed.grown(reach);
+    Ok(match trimming {
+        Trimming::Conventional | Trimming::Envelope => {
+            pack_bricks(&TrimmedBricks::whole(*trimmed.layout()), MAX_TEXELS)?
+        }
+        Trimming::Visible => pack_bricks(&grown().untrimmed(), MAX_TEXELS)?,
+        Trimming::Alone => store_alone(&grown(), MAX_TEXELS)?,
+        Trimming::Merged(options) => merge_bricks(&grown(), &options)?.store(MAX_TEXELS)?,
+        Trimming::Packed => pack_bricks(&grown(), MAX_TEXELS)?,
+    })
+}
+
+impl Held {
+    fn new(
+        source: &TrimmedVolume,
+        (trimming, reach): (Trimming, u32),
+        dark: DarkValues,
+        trimmed: TrimmedBricks,
+        stored: StoredBricks,
+        before: Option<Held>,
+    ) -> (Held, Copied) {
+        let kept_chunk = |i: usize| {
+            let held = before.as_ref()?;
+            held.chunks[i].clone().filter(|_| held.stored.places()[i] == stored.places()[i])
+        };
+        let chunk = |(i, place): (usize, &Option<Place>)| {
+            place.as_ref()?;
+            Some(match kept_chunk(i) {
+                Some(chunk) => (chunk, 0),
+                None => {
+                    let chunk = Arc::new(gather(source, &stored, i));
+                    let n_bytes = chunk.bytes().len();
+                    (chunk, n_bytes)
+                }
+            })
+        };
+        let chunks: Vec<Option<(Arc<Chunk>, usize)>> = stored.places().par_iter().enumerate().map(chunk).collect();
+        let new = || chunks.iter().flatten().filter(|(_, n_bytes)| *n_bytes > 0);
+        let copied = Copied { n_bricks: new().count(), n_bytes: new().map(|(_, n_bytes)| n_bytes).sum() };
+        let chunks: Vec<Option<Arc<Chunk>>> = chunks.into_iter().map(|chunk| chunk.map(|(chunk, _)| chunk)).collect();
+        // A white brick's place is never read.
+        let nowhere = Place::even(UVec3::ZERO, UVec3::ONE, Level(0), DVec3::ZERO);
+        let places = stored.places().iter().map(|place| place.unwrap_or(nowhere)).collect();
+        let (format, decode) = coding(source);
+        let places = Places::Table { texels: stored.texels().max(UVec3::ONE), places };
+        let slots = Slots::new(format, decode, places, chunks.clone()).expect("bricks fill their places");
+        let kept = KeptBoxes::new(layout_boxes(&trimmed));
+        let (slots, kept, index) = match before {
+            Some(held) => (slots.following(&held.slots), kept.following(&held.kept), held.index),
+            None => (slots, kept, None),
+        };
+        let (slots, kept) = (Arc::new(slots), Arc::new(kept));
+        (Held { source: source.id, trimming, reach, dark, trimmed, stored, chunks, slots, kept, index }, copied)
+    }
+
+    /// The field of the bricks that are drawn.
+    fn field(&mut self, layout: &BrickLayout, drawn: &[BrickId]) -> Field {
+        let entry =
+            |id: &BrickId| (id.coords, IndexEntry::Resident { slot: layout.ordinal(*id) as u32, reach: Reach(0) });
+        let lattice = IndexLattice { cell_samples: layout.side().n_cells(), origin: 0.0 };
+        let index = IndexGrid::new(layout.n_bricks(Level(0)), lattice, drawn.iter().map(entry));
+        let index = Arc::new(match &self.index {
+            Some(before) => index.following(before),
+            None => index,
+        });
+        self.index = Some(Arc::clone(&index));
+        let field = Field::new(layout.dims(), index, Arc::clone(&self.slots), Join::Shared);
+        field.expect("an index of bricks that are stored")
+    }
+
+    /// Whether something of a brick is read while it is drawn.
+    fn is_drawn(&self, ordinal: usize, grown: &TrimmedBricks) -> bool {
+        self.trimming == Trimming::Conventional || !grown.kept()[ordinal].is_empty()
+    }
+}
+
+/// The boxes around what may be seen of each brick, in sample space.
+fn layout_boxes(trimmed: &TrimmedBricks) -> Vec<Aabb> {
+    let layout = trimmed.layout();
+    let last = layout.dims() - 1;
+    let of_brick = |id: BrickId| {
+        let kept = trimmed.kept()[layout.ordinal(id)];
+        if kept.is_empty() {
+            return Aabb { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+        }
+        let first = brick_samples(layout, id).first + kept.first;
+        let end = first + kept.n - 1;
+        // Beyond the volume's outer samples values are theirs.
+        Aabb {
+            min: DVec3::select(first.cmpeq(UVec3::ZERO), DVec3::NEG_INFINITY, first.as_dvec3()),
+            max: DVec3::select(end.cmpeq(last), DVec3::INFINITY, end.as_dvec3()),
+        }
+    };
+    layout.bricks(Level(0)).map(of_brick).collect()
+}
+
+fn coding(source: &TrimmedVolume) -> (SampleFormat, brickfield_frame::Decode) {
+    let volume = &source.volume;
+    let range = volume.rescale().stored_range(volume.range());
+    let (format, stored) = SampleFormat::encoding(volume.voxels().scalar_type(), range);
+    (format, stored.rescaled(volume.rescale()))
+}
+
+/// A brick's stored samples in the order of the texture.
+fn gather(source: &TrimmedVolume, stored: &StoredBricks, ordinal: usize) -> Chunk {
+    let volume = &source.volume;
+    let scalar = volume.voxels().scalar_type();
+    let bytes = with_voxels!(volume.voxels(), voxels => {
+        let samples = stored.samples(ordinal, voxels).expect("voxels of the volume");
+        let mut bytes = vec![0; samples.len() * scalar.n_bytes()];
+        Scalar::copy_le_bytes(&samples, &mut bytes);
+        bytes
+    });
+    let range = volume.rescale().stored_range(volume.range());
+    let (format, decode) = SampleFormat::encoding(scalar, range);
+    Chunk::new(encode(bytes, scalar, format, decode))
+}
+
+/// How many samples beside a visible one a frame reads: those of a gradient, and those at the other end of a segment.
+fn reach_of(grid: &Grid, scene: &Scene) -> u32 {
+    let of_light = u32::from(scene.light.is_some());
+    match scene.rule {
+        QuadratureRule::PreIntegrated => of_light + voxels_in_step(grid, scene),
+        _ => of_light,
+    }
+}
+
+/// The plan of a frame of trimmed bricks, all of level 0: the scene's criteria about levels are not asked.
+///
+/// # Errors
+/// As [`prepare`](crate::prepare()); options of merging that do not fit the bricks; bricks that do not fit a texture. Then the residency is
+/// as before.
+pub fn prepare_trimmed(
+    source: &TrimmedVolume,
+    scene: &Scene,
+    trimming: Trimming,
+    residency: &mut TrimResidency,
+) -> Result<FramePlan, PrepareTrimmedError> {
+    check_size(scene.size)?;
+    check_values(source.volume.range())?;
+    let (layout, grid) = (*source.layout(), source.grid());
+    let n_bricks = layout.n_bricks_total(Level(0));
+    if n_bricks >= IndexEntry::MAX_SLOTS as usize {
+        return Err(PrepareError::TooManyBricks { n_bricks, limit: IndexEntry::MAX_SLOTS }.into());
+    }
+    let Course { domain, sampling, rays } = Course::new(grid, scene, Level(0))?;
+    let reach = reach_of(grid, scene);
+    let held = residency.hold(source, scene, trimming, reach)?;
+    let grown = held.trimmed.grown(reach);
+    let in_domain = |id: &BrickId| !to_sample_space(layout.index_box(*id)).intersection(&domain).is_empty();
+    let is_drawn = |id: &BrickId| held.is_drawn(layout.ordinal(*id), &grown) && in_domain(id);
+    let drawn: Vec<BrickId> = layout.bricks(Level(0)).filter(is_drawn).collect();
+    let drawing = match scene.technique {
+        Technique::RayCasting => Drawing::Rays,
+        Technique::Polygons(target) => {
+            check_polygons(&layout, grid, &rays, sampling.step_world(), drawn.len())?;
+            let order = back_to_front(&layout, grid, &scene.camera, &drawn);
+            let back_to_front = order.into_iter().map(|i| drawn[i].coords).collect();
+            Drawing::Polygons { back_to_front, target, slices: Slices::Together }
+        }
+    };
+    let field = held.field(&layout, &drawn);
+    let dark = match trimming.draws_boxes() {
+        true => DarkRegions::beside_boxes(&field, Arc::clone(&held.kept)).expect("a box for each brick"),
+        false => DarkRegions::default(),
+    };
+    let parts = PlanParts::new(field, rays, domain, sampling, scene.transfer.clone());
+    let lighting = scene.light.map(|light| Lighting::new(light, grid));
+    Ok(FramePlan::new(PlanParts { lighting, dark, drawing, ..parts })?)
+}
