@@ -14,5 +14,6 @@ pub mod metrics;
 pub mod orders;
 pub mod paper;
 pub mod report;
+pub mod tong;
 pub mod turns;
 pub mod volumes;

@@ -32,7 +32,7 @@ fn assert_equal(module: &Module, name: &str, (members, size): (Vec<(&str, usize)
 #[test]
 fn host_and_shader_structs_have_the_same_layout() {
     let mut variant = Variant::new(FeatureSet::all(), QuadratureRule::MidpointExponential, Entry::March);
-    variant.features = variant.features.without(Feature::SkipDark).without(Feature::StoredGradients);
+    variant.features = variant.features.without(Feature::StoredGradients);
     variant.field = FieldKind::Placed;
     let module = specialise(&variant).unwrap().module;
     #[rustfmt::skip]

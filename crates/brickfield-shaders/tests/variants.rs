@@ -59,7 +59,7 @@ fn variant(options: &[usize; N_OPTIONS]) -> Option<Variant> {
     let is_asked_for = (!is_nominal || variant.rule == QuadratureRule::MidpointExponential)
         && (!matches!(variant.entry, Entry::Proxy(_)) || is_drawn)
         && (variant.entry != Entry::Proxy(Slices::InteriorsFirst) || is_blended)
-        && (variant.field == FieldKind::Bricks || !features.contains(Feature::SkipDark))
+        && (matches!(variant.field, FieldKind::Bricks | FieldKind::Placed) || !features.contains(Feature::SkipDark))
         && (is_of_blocks || !features.contains(Feature::ShortBlocks))
         && (matches!(variant.field, FieldKind::Blocks(_)) || !features.contains(Feature::Prefiltered))
         && (variant.rule != QuadratureRule::PreIntegrated || !features.contains(Feature::Prefiltered))

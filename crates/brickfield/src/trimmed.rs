@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use crate::course::{Course, to_sample_space, voxels_in_step};
 use crate::encode::encode;
 use crate::prepare::{check_polygons, check_size, check_values};
-use crate::{Copied, PrepareError, Scene, Technique};
+use crate::{Copied, PrepareError, Scene, Skipping, Technique};
 
 /// A volume whose bricks of level 0 are classified slice by slice (Tong, Wang, Tsang and Tang 1999, section 3.2.1).
 #[derive(Debug)]
@@ -317,7 +317,8 @@ fn reach_of(grid: &Grid, scene: &Scene) -> u32 {
     }
 }
 
-/// The plan of a frame of trimmed bricks, all of level 0: the scene's criteria about levels are not asked.
+/// The plan of a frame of trimmed bricks, all of level 0: the scene's criteria about levels are not asked. With
+/// [`Skipping::Off`](crate::Skipping::Off) it is that of [`Trimming::Conventional`].
 ///
 /// # Errors
 /// As [`prepare`](crate::prepare()); options of merging that do not fit the bricks; bricks that do not fit a texture. Then the residency is
@@ -328,6 +329,10 @@ pub fn prepare_trimmed(
     trimming: Trimming,
     residency: &mut TrimResidency,
 ) -> Result<FramePlan, PrepareTrimmedError> {
+    let trimming = match scene.skipping {
+        Skipping::On => trimming,
+        Skipping::Off => Trimming::Conventional,
+    };
     check_size(scene.size)?;
     check_values(source.volume.range())?;
     let (layout, grid) = (*source.layout(), source.grid());

@@ -6,6 +6,7 @@ use brickfield_conformance::compare::{CompareArgs, compare, parse, say, short_of
 use brickfield_conformance::lamar::{LamarArgs, lamar};
 use brickfield_conformance::ljung::{LjungArgs, ljung};
 use brickfield_conformance::report::{Report, absences, table};
+use brickfield_conformance::tong::{TongArgs, tong};
 use clap::Parser;
 
 fn main() -> ExitCode {
@@ -36,6 +37,10 @@ fn of_paper(paper: &str) -> ExitCode {
         "ljung" => {
             let args = LjungArgs::parse();
             (ljung(&args), args.common.check)
+        }
+        "tong" => {
+            let args = TongArgs::parse();
+            (tong(&args), args.common.check)
         }
         _ => {
             let args = LamarArgs::parse();

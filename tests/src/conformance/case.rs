@@ -6,8 +6,8 @@ use std::fmt;
 use brickfield::bricks::{BlockVolume, BrickTree};
 use brickfield::frame::{FramePlan, ShaderFunction};
 use brickfield::{
-    BlockResidency, BlockStyle, PrepareBlocksError, PrepareError, Residency, Scene, Skipping, Technique, prepare,
-    prepare_blocks,
+    BlockResidency, BlockStyle, PrepareBlocksError, PrepareError, PrepareTrimmedError, Residency, Scene, Skipping,
+    Technique, TrimResidency, TrimmedVolume, Trimming, prepare, prepare_blocks, prepare_trimmed,
 };
 use brickfield_core::{Level, Volume};
 
@@ -66,6 +66,16 @@ pub struct PictureTest {
     pub storage: Storage,
     /// The flat blocks that are drawn instead of the octree.
     pub blocks: Option<FlatBlocks>,
+    /// The trimmed bricks that are drawn instead of the octree.
+    pub trimmed: Option<TrimmedBricks>,
+}
+
+/// Trimmed bricks, and which of their samples are stored and drawn.
+pub struct TrimmedBricks {
+    /// The bricks.
+    pub volume: TrimmedVolume,
+    /// Which samples.
+    pub trimming: Trimming,
 }
 
 /// Flat blocks, and how they are drawn.
@@ -159,6 +169,12 @@ impl PictureTest {
     /// # Errors
     /// A scene that `prepare` refuses.
     pub fn prepare(&self, scene: &Scene) -> Result<FramePlan, PrepareError> {
+        if let Some(TrimmedBricks { volume, trimming }) = &self.trimmed {
+            return match prepare_trimmed(volume, scene, *trimming, &mut TrimResidency::default()) {
+                Err(PrepareTrimmedError::Prepare(error)) => Err(error),
+                plan => Ok(plan.expect("a case's bricks are stored")),
+            };
+        }
         let Some(FlatBlocks { volume, levels, style }) = &self.blocks else {
             return prepare(&self.tree, scene, &mut Residency::default());
         };

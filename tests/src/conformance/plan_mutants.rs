@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use brickfield::frame::{
-    Chunk, Chunked, Decode, Feature, FramePlan, IndexEntry, IndexGrid, Mode, ProxyCorner, ProxyGeometry, Reach,
-    SampleFormat, Sampling, Slots, SpoiltPlan,
+    Chunk, Chunked, Decode, Feature, FramePlan, IndexEntry, IndexGrid, KeptBoxes, Mode, ProxyCorner, ProxyGeometry,
+    Reach, SampleFormat, Sampling, Slots, SpoiltPlan,
 };
 use brickfield_core::glam::{DVec3, UVec3, Vec3Swizzles};
 use brickfield_core::{Aabb, Knot, TransferFunction};
@@ -83,6 +83,8 @@ pub enum PlanMutant {
     BetweenMissing,
     /// The picture of all earlier batches is forgotten when the last batch begins.
     BatchesForgotten,
+    /// The boxes of trimmed bricks begin a sample late along x.
+    KeptTooSmall,
     /// Surfaces begin at a gradient a fifth higher.
     FlatBelowScaled,
     /// Diffuse light is 5 % too dim.
@@ -93,7 +95,7 @@ pub enum PlanMutant {
 
 impl PlanMutant {
     /// All plan mutants.
-    pub const ALL: [PlanMutant; 38] = [
+    pub const ALL: [PlanMutant; 39] = [
         PlanMutant::AnchorHalfVoxel,
         PlanMutant::PixelCorner,
         PlanMutant::RowsFlipped,
@@ -129,6 +131,7 @@ impl PlanMutant {
         PlanMutant::StackMissing,
         PlanMutant::BetweenMissing,
         PlanMutant::BatchesForgotten,
+        PlanMutant::KeptTooSmall,
         PlanMutant::FlatBelowScaled,
         PlanMutant::DiffuseDimmed,
         PlanMutant::LightTurned,
@@ -172,6 +175,7 @@ impl PlanMutant {
             PlanMutant::StackMissing => "plan/stack-missing",
             PlanMutant::BetweenMissing => "plan/between-missing",
             PlanMutant::BatchesForgotten => "plan/batches-forgotten",
+            PlanMutant::KeptTooSmall => "plan/kept-too-small",
             PlanMutant::FlatBelowScaled => "plan/flat-below-scaled",
             PlanMutant::DiffuseDimmed => "plan/diffuse-dimmed",
             PlanMutant::LightTurned => "plan/light-turned",
@@ -243,6 +247,11 @@ impl PlanMutant {
             PlanMutant::StackMissing => drop_triangles(plan, |corner| corner.owner / 2 == 2),
             PlanMutant::BetweenMissing => drop_triangles(plan, |corner| corner.brick % 2 == 1),
             PlanMutant::BatchesForgotten => forget_batches(plan),
+            PlanMutant::KeptTooSmall => {
+                let late = |b: &Aabb| Aabb { min: b.min + DVec3::X, ..*b };
+                let boxes = |kept: Arc<KeptBoxes>| Arc::new(KeptBoxes::new(kept.boxes().iter().map(late).collect()));
+                plan.kept = plan.kept.take().map(boxes);
+            }
             PlanMutant::FlatBelowScaled => {
                 relight(plan, |light| (light.source(), light.terms(), 1.2 * light.flat_below()))
             }

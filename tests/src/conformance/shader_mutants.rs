@@ -220,6 +220,12 @@ mutants! {
     /// The first sample lies at the block's corner.
     PLACED_FIRST: "placed-first", "field/placed", "patch_of", "area.first = place.first + frame.first_sample.xyz;"
         => "area.first = block.corner;";
+    /// The boxes of trimmed bricks end a sample early.
+    KEPT_TOO_SMALL: "kept-too-small", "field/placed", "patch_of", "area.kept.high = clamp(high, area.region.low, area.region.high);"
+        => "area.kept.high = clamp(high - 1.0, area.region.low, area.region.high);";
+    /// Beside a trimmed brick's box it is dark to the box's far face.
+    DARK_PAST_THE_BOX: "dark-past-the-box", "field/placed", "dark_around", "around.region.high[axis] = area.kept.low[axis];"
+        => "around.region.high[axis] = area.kept.high[axis];";
     /// Slots are read as if they were of level 0.
     PLACED_SCALE: "placed-scale", "field/placed", "patch_of", "area.scale = 1.0 / f32(1u << place.level);" => "area.scale = 1.0;";
     /// Gradients are of the grid's axes, not of the world's.

@@ -9,11 +9,11 @@ use brickfield_core::glam::UVec2;
 use brickfield_core::{BrickId, BrickSide, Camera, Image};
 
 use super::LamarArgs;
-use super::scenes::{DataSet, Geometry, data_sets, geometries, geometries_of, scene, tree, views};
+use super::scenes::{Geometry, data_sets, geometries, geometries_of, scene, tree, views};
 use super::seams::{camera as cube_camera, cube};
 use crate::compare::rivals::Rivals;
 use crate::paper::panels::{beside, stacked};
-use crate::paper::{Missed, PaperError, frame_of};
+use crate::paper::{Missed, PaperError, Subject, frame_of};
 
 /// Bricks' side in figure 14: the paper's.
 const SIDE: BrickSide = BrickSide::S16;
@@ -50,7 +50,7 @@ fn figure_8(args: &LamarArgs, backend: &mut dyn Backend) -> Result<(), PaperErro
 }
 
 /// From the surface and from inside: the bricks and the picture, with fixed tiles and with multiresolution.
-fn figure_14(args: &LamarArgs, backend: &mut dyn Backend, data_set: &DataSet) -> Result<(), PaperError> {
+fn figure_14(args: &LamarArgs, backend: &mut dyn Backend, data_set: &Subject) -> Result<(), PaperError> {
     let tree = tree(&data_set.volume, SIDE, Downsampling::Subsample)?;
     // Beside the line of the views, so that cameras are seen from their sides.
     let overview: Viewpoint = "from=-1,-0.4,0.5 zoom=0.8".parse().expect("a viewpoint");

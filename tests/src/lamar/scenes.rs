@@ -1,29 +1,17 @@
 //! The volumes that are rendered, from where, by which geometry.
 
-use std::path::Path;
-
 use brickfield::bricks::{BrickTree, BuildOptions, Downsampling, build_tree};
 use brickfield::frame::{Backend, Division, Placement, Target};
-use brickfield::io::{OpenOptions, WorldFrame, open};
 use brickfield::lod::Criterion;
-use brickfield::optics::automatic;
 use brickfield::{Scene, Technique, Viewpoint};
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{BrickSide, Camera, Grid, IndexPos, Projection, Ray, TransferFunction, Volume, WorldPos};
 
 use super::{LamarArgs, Part};
-use crate::paper::PaperError;
+use crate::paper::{PaperError, Subject};
 
 /// The data sets, as paths below the folder of real volumes.
 const DATA: [&str; 3] = ["ct/engine.vti", "ct/aneurism.vti", "ct/LIDC2.mha"];
-
-/// A volume with its transfer function.
-pub(super) struct DataSet {
-    pub(super) name: String,
-    pub(super) volume: Volume,
-    pub(super) transfer: TransferFunction,
-    pub(super) frame: WorldFrame,
-}
 
 /// How samples are placed, and by whom.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,14 +27,8 @@ pub(super) fn check_data(args: &LamarArgs) -> Result<(), PaperError> {
 }
 
 /// The volumes that are asked for, one by one.
-pub(super) fn data_sets(args: &LamarArgs) -> Result<impl Iterator<Item = Result<DataSet, PaperError>>, PaperError> {
-    Ok(args.common.named(&DATA)?.into_iter().map(|(name, path)| data_set(name, &path)))
-}
-
-fn data_set(name: String, path: &Path) -> Result<DataSet, PaperError> {
-    let opened = open(path, &OpenOptions::default())?;
-    let transfer = automatic(&opened.volume);
-    Ok(DataSet { name, transfer, frame: opened.frame, volume: opened.volume })
+pub(super) fn data_sets(args: &LamarArgs) -> Result<impl Iterator<Item = Result<Subject, PaperError>>, PaperError> {
+    Ok(args.common.named(&DATA)?.into_iter().map(|(name, path)| Subject::of_file(name, &path)))
 }
 
 /// The brick sides that are asked for.
@@ -60,7 +42,7 @@ pub(super) fn tree(volume: &Volume, side: BrickSide, downsampling: Downsampling)
 }
 
 /// Three views along one line: from outside, from the box's surface, and from half-way to its centre.
-pub(super) fn views(data_set: &DataSet, size: UVec2) -> Result<[(&'static str, Camera); 3], PaperError> {
+pub(super) fn views(data_set: &Subject, size: UVec2) -> Result<[(&'static str, Camera); 3], PaperError> {
     let grid = data_set.volume.grid();
     let outside = Viewpoint::default().camera(grid, data_set.frame, size)?;
     let center = grid.world_box().center();

@@ -9,9 +9,9 @@ use serde::Serialize;
 
 use super::LamarArgs;
 use super::measure::{Distance, Drawn, Judge, SceneTimes, answer, distance, duel};
-use super::scenes::{DataSet, Geometry, data_sets, geometries, geometries_of, scene, sides, tree, views};
+use super::scenes::{Geometry, data_sets, geometries, geometries_of, scene, sides, tree, views};
 use crate::compare::rivals::Rivals;
-use crate::paper::{Missed, PaperError, print};
+use crate::paper::{Missed, PaperError, Subject, print};
 use crate::turns::{Bound, Claim, Claims, Ratio, Spread, Standing};
 
 /// A line of the table: one data set, view, tile size, geometry and backend.
@@ -43,7 +43,7 @@ struct Tiling {
 
 /// One tree seen from one place.
 struct Seat<'a> {
-    data_set: &'a DataSet,
+    data_set: &'a Subject,
     tree: &'a BrickTree,
     camera: Camera,
     view: &'static str,

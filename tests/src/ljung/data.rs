@@ -5,18 +5,15 @@ use std::sync::Arc;
 
 use brickfield::bricks::{BlockOptions, BlockSource, BlockVolume, build_blocks};
 use brickfield::frame::Mode;
-use brickfield::io::{OpenOptions, WorldFrame, open};
+use brickfield::io::WorldFrame;
 use brickfield::lod::{
     BlockBudget, BlockErrors, BlockSelection, BudgetSize, OneSampleBlocks, Slab, select_block_levels,
 };
-use brickfield::optics::automatic;
 use brickfield::{Scene, Viewpoint};
-use brickfield_core::glam::UVec3;
-use brickfield_core::{ScalarType, TransferFunction, Volume};
+use brickfield_core::{TransferFunction, Volume};
 
 use super::LjungArgs;
-use crate::paper::PaperError;
-use crate::volumes::{Phantom, phantom_of};
+use crate::paper::{PaperError, Subject};
 
 /// The data sets, as paths below the folder of real volumes.
 const DATA: [&str; 3] = ["ct/LIDC2.mha", "ct/engine.vti", "mri/spm152.nii.gz"];
@@ -41,27 +38,16 @@ pub(super) fn data_sets<'a>(
     args: &'a LjungArgs,
 ) -> Result<impl Iterator<Item = Result<DataSet, PaperError>> + use<'a>, PaperError> {
     let is_own = args.common.files.is_empty() && args.common.only.is_none();
-    let generated = is_own.then(|| of_phantom(args));
+    let generated = is_own.then(|| of_subject(args, Subject::of_phantom(args.volume_side)));
     Ok(args.common.named(&DATA)?.into_iter().map(|(name, path)| of_file(args, name, path)).chain(generated))
 }
 
 fn of_file(args: &LjungArgs, name: String, path: PathBuf) -> Result<DataSet, PaperError> {
-    let opened = open(&path, &OpenOptions::default())?;
-    let transfer = automatic(&opened.volume);
-    of_volume(args, name, (Arc::new(opened.volume), opened.frame), transfer)
+    of_subject(args, Subject::of_file(name, &path)?)
 }
 
-fn of_phantom(args: &LjungArgs) -> Result<DataSet, PaperError> {
-    let Phantom { volume, transfer, .. } = phantom_of(UVec3::splat(args.volume_side), ScalarType::U8);
-    of_volume(args, format!("generated {}^3", args.volume_side), (Arc::new(volume), WorldFrame::Lps), transfer)
-}
-
-fn of_volume(
-    args: &LjungArgs,
-    name: String,
-    (volume, frame): (Arc<Volume>, WorldFrame),
-    transfer: TransferFunction,
-) -> Result<DataSet, PaperError> {
+fn of_subject(args: &LjungArgs, subject: Subject) -> Result<DataSet, PaperError> {
+    let Subject { name, volume, transfer, frame } = subject;
     let options = BlockOptions { side: args.blocks, ..BlockOptions::default() };
     let blocks = build_blocks(Arc::clone(&volume), &options)?;
     let slab = Slab::of_block(blocks.layout(), blocks.grid());

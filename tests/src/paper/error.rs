@@ -34,6 +34,12 @@ pub enum PaperError {
     #[error(transparent)]
     PrepareBlocks(#[from] brickfield::PrepareBlocksError),
     #[error(transparent)]
+    PrepareTrimmed(#[from] brickfield::PrepareTrimmedError),
+    #[error(transparent)]
+    Trim(#[from] brickfield::trim::MergeError),
+    #[error(transparent)]
+    Store(#[from] brickfield::trim::PackError),
+    #[error(transparent)]
     Blocks(#[from] brickfield::bricks::BlockBuildError),
     #[error(transparent)]
     Errors(#[from] brickfield::lod::EstimateError),
@@ -68,6 +74,7 @@ impl From<FrameError> for PaperError {
         match e {
             FrameError::Prepare(e) => PaperError::Prepare(e),
             FrameError::PrepareBlocks(e) => PaperError::PrepareBlocks(e),
+            FrameError::PrepareTrimmed(e) => PaperError::PrepareTrimmed(e),
             FrameError::Render { backend, source } => PaperError::Render { backend, source },
         }
     }

@@ -2,6 +2,7 @@
 
 mod error;
 pub(crate) mod panels;
+mod subject;
 
 use std::path::PathBuf;
 
@@ -13,6 +14,7 @@ use brickfield_core::glam::UVec2;
 use clap::{Args, ValueEnum};
 
 pub use error::PaperError;
+pub(crate) use subject::Subject;
 
 use crate::compare::rivals::{RivalArgs, Rivals};
 use crate::compare::say;
@@ -24,13 +26,13 @@ pub struct PaperArgs {
     /// The paper
     #[arg(long, value_enum)]
     pub paper: Paper,
-    /// Volume files or folders, in any format that `brickfield render` reads, instead of the three data sets
+    /// Volume files or folders, in any format that `brickfield render` reads, instead of the paper's data sets
     #[arg(value_name = "FILE", conflicts_with = "only")]
     pub files: Vec<PathBuf>,
     /// The folder of real volumes
     #[arg(long, env = "BRICKFIELD_DATA", value_name = "FOLDER")]
     pub data: Option<PathBuf>,
-    /// Of the three data sets, only those whose path contains this
+    /// Of the paper's data sets, only those whose path contains this
     #[arg(long, value_name = "TEXT")]
     pub only: Option<String>,
     /// Size of the pictures in pixels
@@ -60,6 +62,8 @@ pub enum Paper {
     Lamar,
     /// Ljung, Lundstroem and Ynnerman 2006: multiresolution interblock interpolation in direct volume rendering.
     Ljung,
+    /// Tong, Wang, Tsang and Tang 1999: efficiently rendering large volume data using texture mapping hardware.
+    Tong,
 }
 
 /// The subject of a claim.

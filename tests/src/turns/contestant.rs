@@ -5,7 +5,8 @@ use std::time::Instant;
 use brickfield::bricks::{BlockSource, BrickTree};
 use brickfield::frame::{Backend, FramePlan, RenderError};
 use brickfield::{
-    BlockResidency, BlockStyle, PrepareBlocksError, PrepareError, Residency, Scene, prepare, prepare_blocks,
+    BlockResidency, BlockStyle, PrepareBlocksError, PrepareError, PrepareTrimmedError, Residency, Scene, TrimResidency,
+    TrimmedVolume, Trimming, prepare, prepare_blocks, prepare_trimmed,
 };
 use brickfield_core::{Image, Level};
 
@@ -21,6 +22,7 @@ pub struct Contestant<'a> {
 enum Subject<'a> {
     Tree(&'a BrickTree, Box<Residency>),
     Blocks(&'a dyn BlockSource, Vec<Level>, BlockStyle, Box<BlockResidency>),
+    Trimmed(&'a TrimmedVolume, Trimming, Box<TrimResidency>),
 }
 
 /// A frame and its times in milliseconds.
@@ -33,6 +35,8 @@ pub struct TimedFrame {
     pub prepare_ms: f64,
     /// From the scene to the picture.
     pub ms: f64,
+    /// Bytes that were brought to the device.
+    pub uploaded_bytes: u64,
 }
 
 /// Why there is no frame.
@@ -44,6 +48,8 @@ pub enum FrameError {
     Prepare(#[from] PrepareError),
     #[error(transparent)]
     PrepareBlocks(#[from] PrepareBlocksError),
+    #[error(transparent)]
+    PrepareTrimmed(#[from] PrepareTrimmedError),
     #[error("{backend}: {source}")]
     Render { backend: &'static str, source: RenderError },
 }
@@ -59,6 +65,11 @@ impl<'a> Contestant<'a> {
         Contestant { subject: Subject::Blocks(source, levels, style, Box::default()), scene }
     }
 
+    /// A scene of trimmed bricks that no backend has yet.
+    pub fn of_trimmed(volume: &'a TrimmedVolume, trimming: Trimming, scene: Scene) -> Contestant<'a> {
+        Contestant { subject: Subject::Trimmed(volume, trimming, Box::default()), scene }
+    }
+
     /// Renders a frame. The bricks are resident if the backend's frame before was this contestant's, too; if not, the time
     /// includes their upload.
     ///
@@ -71,11 +82,15 @@ impl<'a> Contestant<'a> {
             Subject::Blocks(source, levels, style, residency) => {
                 prepare_blocks(*source, &self.scene, levels, *style, residency)?
             }
+            Subject::Trimmed(volume, trimming, residency) => {
+                prepare_trimmed(volume, &self.scene, *trimming, residency)?
+            }
         };
         let prepare_ms = milliseconds_since(begin);
         let name = backend.describe().backend;
         let rendered = backend.render(&plan).map_err(|source| FrameError::Render { backend: name, source })?;
-        Ok(TimedFrame { ms: milliseconds_since(begin), plan, image: rendered.image, prepare_ms })
+        let (ms, uploaded_bytes) = (milliseconds_since(begin), rendered.uploaded_bytes);
+        Ok(TimedFrame { ms, plan, image: rendered.image, prepare_ms, uploaded_bytes })
     }
 
     /// Takes a turn. The bricks are resident in a timed one: unless the turn before was this contestant's, a frame that is not

@@ -3,7 +3,7 @@
 mod cluster;
 
 use brickfield_core::glam::{UVec2, UVec3};
-use brickfield_core::{Axes, BrickId, BrickLayout, Level};
+use brickfield_core::{Axes, BrickId, BrickLayout, BrickSide, Level};
 
 use crate::stored::Part;
 use crate::{Class, PackError, SampleBox, StoredBricks, TexelAccount, TrimmedBricks, brick_samples, pack_boxes};
@@ -31,6 +31,14 @@ impl Default for MergeOptions {
             first: FirstMerge::default(),
             between: BetweenClusters::default(),
         }
+    }
+}
+
+impl MergeOptions {
+    /// The paper's proportions for bricks of another size: a cache of a cluster's bricks.
+    pub fn of_bricks(side: BrickSide) -> MergeOptions {
+        let n = side.n_samples();
+        MergeOptions { cache: UVec3::new(2 * n, 2 * n, n), ..MergeOptions::default() }
     }
 }
 

@@ -14,6 +14,7 @@ mod prefiltered;
 mod real;
 mod setup;
 mod storages;
+mod trimmed;
 mod views;
 
 use super::case::Case;
@@ -32,6 +33,7 @@ pub fn all() -> Vec<Case> {
         blocks::cases(),
         light::cases(),
         prefiltered::cases(),
+        trimmed::cases(),
         extremes::cases(),
         real::cases(),
     ]

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use brickfield::bricks::{BlockOptions, BlockSource, BuildOptions, Downsampling, build_blocks, build_tree};
 use brickfield::lod::{BlockLevels, Criterion};
-use brickfield::{BlockStyle, Scene};
+use brickfield::{BlockStyle, Scene, TrimmedVolume, Trimming};
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{
     Aabb, BlockLayout, BlockSide, BrickSide, Camera, Level, Projection, ScalarType, TransferFunction, Volume,
 };
 use brickfield_optics::{Light, LightSource, LightTerms, Normals, QuadratureRule, flat_below};
 
-use super::super::case::{Case, Check, FlatBlocks, Mutant, NoData, Oracle, PictureTest, Shows};
+use super::super::case::{Case, Check, FlatBlocks, Mutant, NoData, Oracle, PictureTest, Shows, TrimmedBricks};
 use super::super::storage::Storage;
 
 /// A scene in the making.
@@ -24,6 +24,7 @@ pub(super) struct Setup {
     triangles_at_a_time: Option<u32>,
     storage: Storage,
     blocks: Option<(BlockSide, FlatLevels, BlockStyle)>,
+    trimming: Option<Trimming>,
     scene: Scene,
 }
 
@@ -72,6 +73,7 @@ impl Setup {
             triangles_at_a_time: None,
             storage: Storage::default(),
             blocks: None,
+            trimming: None,
             scene: Scene::new(camera, PICTURE, transfer),
             volume,
         }
@@ -106,6 +108,11 @@ impl Setup {
             _ => OracleKind::None,
         };
         Setup { oracle, blocks: Some((side, levels, style)), ..self }
+    }
+
+    /// Draws trimmed bricks.
+    pub(super) fn trimmed(self, trimming: Trimming) -> Setup {
+        Setup { trimming: Some(trimming), ..self }
     }
 
     /// In the light; surfaces begin at a gradient of a 64th of the values' range in the least spacing.
@@ -193,6 +200,10 @@ impl Setup {
             let volume = volume.expect("a case's blocks fit");
             FlatBlocks { levels: levels.of(*volume.layout()).levels().to_vec(), volume, style }
         });
+        let trimmed = self.trimming.map(|trimming| {
+            let volume = TrimmedVolume::new(Arc::new(self.volume.clone()), self.side);
+            TrimmedBricks { volume, trimming }
+        });
         let volume = Box::new(self.volume);
         let oracle = match self.oracle {
             OracleKind::Volume => Oracle::Volume(volume),
@@ -200,7 +211,7 @@ impl Setup {
             OracleKind::None => Oracle::None,
         };
         let Setup { scene, shows, triangles_at_a_time, storage, .. } = self;
-        PictureTest { tree, scene, oracle, shows, triangles_at_a_time, storage, blocks }
+        PictureTest { tree, scene, oracle, shows, triangles_at_a_time, storage, blocks, trimmed }
     }
 }
 

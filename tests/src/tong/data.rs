@@ -1,0 +1,91 @@
+//! The volumes that are rendered, and their scenes.
+
+use std::sync::Arc;
+
+use brickfield::bricks::{BrickTree, BuildOptions, build_tree};
+use brickfield::frame::{Division, Mode, Placement, Target};
+use brickfield::trim::DarkValues;
+use brickfield::{Scene, Technique, TrimmedVolume, Viewpoint};
+use brickfield_core::{Scalar, TransferFunction, ValueRange, with_voxels};
+use rayon::prelude::*;
+
+use super::TongArgs;
+use crate::paper::{PaperError, Subject};
+
+/// The data sets, as paths below the folder of real volumes.
+const DATA: [&str; 6] =
+    ["ct/engine.vti", "ct/aneurism.vti", "ct/LIDC2.mha", "ct/tooth.nhdr", "ct/frogtissue.mhd", "mri/spm152.nii.gz"];
+
+/// A volume in bricks, with its transfer function.
+pub(super) struct DataSet {
+    pub(super) subject: Subject,
+    pub(super) trimmed: TrimmedVolume,
+    pub(super) tree: BrickTree,
+}
+
+/// Whether the data that the parts need are there.
+pub(super) fn check_data(args: &TongArgs) -> Result<(), PaperError> {
+    args.common.check_data(&DATA, args.parts().into_iter().any(|part| part.needs_data()))
+}
+
+/// The volumes that are asked for, one by one.
+pub(super) fn data_sets(args: &TongArgs) -> Result<impl Iterator<Item = Result<DataSet, PaperError>>, PaperError> {
+    let side = args.side;
+    Ok(args.common.named(&DATA)?.into_iter().map(move |(name, path)| {
+        let subject = Subject::of_file(name, &path)?;
+        let tree = build_tree(&subject.volume, &BuildOptions { side, ..BuildOptions::default() })?;
+        Ok(DataSet { trimmed: TrimmedVolume::new(Arc::clone(&subject.volume), side), tree, subject })
+    }))
+}
+
+/// How samples are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Renderer {
+    Rays,
+    Slices,
+}
+
+impl Renderer {
+    pub(super) const ALL: [Renderer; 2] = [Renderer::Rays, Renderer::Slices];
+
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Renderer::Rays => "rays",
+            Renderer::Slices => "slices",
+        }
+    }
+}
+
+impl DataSet {
+    /// The whole volume, obliquely, under a transfer function.
+    pub(super) fn scene(
+        &self,
+        args: &TongArgs,
+        renderer: Renderer,
+        transfer: TransferFunction,
+    ) -> Result<Scene, PaperError> {
+        let camera = Viewpoint::default().camera(self.subject.volume.grid(), self.subject.frame, args.common.size)?;
+        let scene = Scene::new(camera, args.common.size, transfer);
+        let scene = Scene { step_voxels: args.common.step, mode: Mode::Exact, ..scene };
+        Ok(match renderer {
+            Renderer::Rays => scene,
+            // The paper's parallel polygons.
+            Renderer::Slices => Scene {
+                technique: Technique::Polygons(Target::Float32),
+                placement: Placement::ViewportPlanes,
+                division: Division::Brick,
+                ..scene
+            },
+        })
+    }
+
+    /// The share of voxels that a transfer function makes invisible.
+    pub(super) fn empty_share(&self, transfer: &TransferFunction) -> f64 {
+        let (dark, rescale) = (DarkValues::of(transfer), self.subject.volume.rescale());
+        let is_dark = |value: f64| dark.covers(ValueRange { min: value, max: value });
+        let n_dark = with_voxels!(self.subject.volume.voxels(), voxels => {
+            voxels.par_iter().filter(|voxel| is_dark(rescale.value(voxel.to_f64()))).count()
+        });
+        n_dark as f64 / self.subject.volume.voxels().len() as f64
+    }
+}
