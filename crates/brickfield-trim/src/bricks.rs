@@ -218,3 +218,41 @@ impl TrimmedBricks {
         counts
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use brickfield_core::Grid;
+    use brickfield_core::glam::DVec3;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+
+        #[test]
+        fn grown_boxes_hold_every_sample_within_reach(
+            n in prop::array::uniform3(1u32..50), object in prop::array::uniform3(0u32..50), reach in 0..40u32
+        ) {
+            let dims = UVec3::from(n);
+            let object = UVec3::from(object) % dims;
+            let grid = Grid::axis_aligned(dims, DVec3::ONE).unwrap();
+            let mut voxels = vec![0u8; grid.n_voxels()];
+            voxels[(object.x + dims.x * (object.y + dims.y * object.z)) as usize] = 1;
+            let arrays = BrickArrays::of_volume(&Volume::new(grid, voxels).unwrap(), BrickSide::S16);
+            let trimmed = trim_bricks(&arrays, &DarkValues::below(1.0).unwrap(), Interpolation::Nearest);
+            let grown = trimmed.grown(reach);
+            let layout = trimmed.layout();
+            for id in layout.bricks(Level(0)) {
+                let (samples, kept) = (brick_samples(layout, id), grown.kept()[layout.ordinal(id)]);
+                for i in 0..samples.n.element_product() {
+                    let own = UVec3::new(i % samples.n.x, i / samples.n.x % samples.n.y, i / (samples.n.x * samples.n.y));
+                    let distance = (samples.first + own).as_ivec3() - object.as_ivec3();
+                    prop_assert_eq!(distance.abs().max_element() <= reach as i32, kept.contains(own), "{} {}", id, own);
+                }
+            }
+            let whole = trimmed.untrimmed();
+            prop_assert!(whole.kept().iter().zip(trimmed.kept()).all(|(w, k)| w.is_empty() == k.is_empty()));
+        }
+    }
+}

@@ -365,3 +365,123 @@ pub fn prepare_trimmed(
     let lighting = scene.light.map(|light| Lighting::new(light, grid));
     Ok(FramePlan::new(PlanParts { lighting, dark, drawing, ..parts })?)
 }
+
+#[cfg(test)]
+mod tests {
+    use brickfield_core::glam::UVec2;
+    use brickfield_core::{Camera, Image, Knot, TransferFunction};
+    use brickfield_frame::Feature;
+    use brickfield_optics::{Light, LightSource, LightTerms};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::{BackendKind, Validation, open_backend};
+
+    /// Noise of two values, rarely the greater one.
+    fn volume(dims: UVec3, seed: u32) -> Arc<Volume> {
+        let grid = Grid::axis_aligned(dims, DVec3::ONE).unwrap();
+        let noise = |i: u32| (i ^ seed).wrapping_mul(2_654_435_761).rotate_left(15).wrapping_mul(2_246_822_519) >> 16;
+        let voxel = |i: u32| if noise(i) % 211 == 0 { 200u8 } else { (noise(i) % 40) as u8 };
+        Arc::new(Volume::new(grid, (0..grid.n_voxels() as u32).map(voxel).collect::<Vec<_>>()).unwrap())
+    }
+
+    /// Values from a threshold on are seen.
+    fn scene(grid: &Grid, threshold: f64) -> Scene {
+        let camera = Camera::framing(&grid.world_box(), DVec3::new(1.0, 2.0, 3.0), DVec3::Z).unwrap();
+        let knot = |value: f64, extinction: f64| Knot { value, extinction, color: [0.2, 0.5, 1.0] };
+        let transfer = TransferFunction::new(vec![knot(threshold, 0.0), knot(threshold + 30.0, 0.4)]).unwrap();
+        Scene::new(camera, UVec2::new(20, 16), transfer)
+    }
+
+    fn picture(plan: &FramePlan) -> Image<f32> {
+        let mut backend = open_backend(BackendKind::Cpu, None, Validation::Off).unwrap();
+        backend.render(plan).unwrap().image
+    }
+
+    fn all(side: BrickSide) -> [Trimming; 6] {
+        let merged = Trimming::Merged(MergeOptions::of_bricks(side));
+        [Trimming::Conventional, Trimming::Envelope, Trimming::Visible, Trimming::Alone, merged, Trimming::Packed]
+    }
+
+    fn assert_like(found: &Image<f32>, expected: &Image<f32>, what: &str) {
+        let channels = found.pixels().iter().flatten().zip(expected.pixels().iter().flatten());
+        let most = channels.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(most < 2e-5, "{what}: {most}");
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+
+        #[test]
+        fn every_trimming_shows_the_whole_picture(
+            n in prop::array::uniform3(1u32..50), seed: u32, threshold in 5.0..190.0f64, rule in 0..5usize, is_lit: bool
+        ) {
+            let source = TrimmedVolume::new(volume(UVec3::from(n), seed), BrickSide::S16);
+            let light = Light::new(LightSource::Head, LightTerms::default(), 20.0).unwrap();
+            let scene = Scene {
+                rule: QuadratureRule::ALL[rule % QuadratureRule::ALL.len()],
+                light: is_lit.then_some(light),
+                step_voxels: 1.7,
+                ..scene(source.grid(), threshold)
+            };
+            let of = |trimming| picture(&prepare_trimmed(&source, &scene, trimming, &mut TrimResidency::default()).unwrap());
+            let whole = of(Trimming::Conventional);
+            for trimming in all(BrickSide::S16) {
+                assert_like(&of(trimming), &whole, &format!("{trimming:?}"));
+            }
+        }
+    }
+
+    #[test]
+    fn an_edit_gathers_bricks_of_another_box_alone() {
+        let source = TrimmedVolume::new(volume(UVec3::new(61, 46, 31), 1), BrickSide::S16);
+        for trimming in all(BrickSide::S16) {
+            let mut residency = TrimResidency::default();
+            for threshold in [150.0, 150.0, 120.0, 30.0, 199.0, 250.0, 150.0] {
+                let scene = scene(source.grid(), threshold);
+                let plan = prepare_trimmed(&source, &scene, trimming, &mut residency).unwrap();
+                let fresh = prepare_trimmed(&source, &scene, trimming, &mut TrimResidency::default()).unwrap();
+                assert_eq!((picture(&plan), plan.kept()), (picture(&fresh), fresh.kept()), "{trimming:?}, {threshold}");
+                let again = prepare_trimmed(&source, &scene, trimming, &mut residency).unwrap();
+                assert_eq!((residency.copied(), residency.n_reclassified()), (Copied::default(), 0));
+                assert!(Arc::ptr_eq(plan.field().slots(), again.field().slots()));
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_visible_is_stored_as_nothing() {
+        let source = TrimmedVolume::new(volume(UVec3::new(61, 46, 31), 2), BrickSide::S16);
+        for trimming in all(BrickSide::S16).into_iter().skip(2) {
+            let mut residency = TrimResidency::default();
+            let plan = prepare_trimmed(&source, &scene(source.grid(), 201.0), trimming, &mut residency).unwrap();
+            assert!(plan.shows_nothing() && plan.field().slots().n_bytes() == 0, "{trimming:?}");
+            assert_eq!((residency.account().n_texels, residency.counts().n_white), (0, source.arrays().arrays().len()));
+        }
+    }
+
+    #[test]
+    fn whole_bricks_need_no_boxes_and_slices_leap_over_nothing() {
+        let source = TrimmedVolume::new(volume(UVec3::new(61, 46, 31), 3), BrickSide::S16);
+        let scene = scene(source.grid(), 150.0);
+        let plan = |scene: &Scene, trimming| prepare_trimmed(&source, scene, trimming, &mut TrimResidency::default());
+        for trimming in all(BrickSide::S16) {
+            let plan = plan(&scene, trimming).unwrap();
+            assert_eq!(plan.features().contains(Feature::SkipDark), trimming.draws_boxes(), "{trimming:?}");
+            assert_eq!(plan.kept().is_some(), trimming.draws_boxes());
+        }
+        let slices = Scene {
+            technique: Technique::Polygons(brickfield_frame::Target::Float32),
+            placement: brickfield_frame::Placement::ViewportPlanes,
+            division: brickfield_frame::Division::Brick,
+            ..scene.clone()
+        };
+        let n_polygons = |trimming| plan(&slices, trimming).unwrap().proxy().unwrap().n_polygons();
+        assert!(n_polygons(Trimming::Packed) < n_polygons(Trimming::Visible));
+        assert!(!plan(&slices, Trimming::Packed).unwrap().features().contains(Feature::SkipDark));
+        let too_small = MergeOptions::of_bricks(BrickSide::S16);
+        let wide = TrimmedVolume::new(volume(UVec3::new(61, 46, 31), 3), BrickSide::S32);
+        let refused = prepare_trimmed(&wide, &scene, Trimming::Merged(too_small), &mut TrimResidency::default());
+        assert!(refused.unwrap_err().to_string().starts_with("merging trimmed bricks: "));
+    }
+}
