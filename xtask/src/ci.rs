@@ -97,9 +97,17 @@ fn steps() -> Result<Vec<Step>> {
     let store = ["--part", "store", "--store-dims", "160x128x192", "--store-mib", "1", "--out", "target/store"];
     let store = [&of_ljung[..], &store].concat();
     steps.push(step("a store larger than its budget", move || checked("compare", &store).run()));
-    let rows = ["--part", "table,rank,classify", "--only", "engine", "--ratios", "32", "--size", "96x96", "--frames", "1"];
+    let rows =
+        ["--part", "table,rank,classify", "--only", "engine", "--ratios", "32", "--size", "96x96", "--frames", "1"];
     let table = [&of_ljung[..], &rows].concat();
     steps.push(step_with_data("rows of Ljung's table", move || checked("compare", &table).run()));
+    let of_tong = ["--paper", "tong", "--check=pictures", "--require", "wgpu,ash"];
+    let counts = [&of_tong[..], &["--part", "counts"]].concat();
+    steps.push(step("claims of Tong, Wang, Tsang and Tang 1999", move || checked("compare", &counts).run()));
+    let rows =
+        ["--part", "merge,table,sweep", "--only", "engine", "--size", "64x64", "--frames", "1", "--thresholds", "5"];
+    let table = [&of_tong[..], &rows].concat();
+    steps.push(step_with_data("rows of Tong's table", move || checked("compare", &table).run()));
     Ok(steps)
 }
 
