@@ -8,6 +8,7 @@ pub mod compare;
 pub mod conformance;
 pub mod gpu;
 pub mod lamar;
+pub mod left_out;
 pub mod ljung;
 mod memory;
 pub mod metrics;

@@ -73,6 +73,22 @@ pub enum Trimming {
 }
 
 impl Trimming {
+    /// The names of [`of_name`](Self::of_name).
+    pub const NAMES: [&'static str; 6] = ["conventional", "envelope", "visible", "alone", "merged", "packed"];
+
+    /// By name, for bricks of `side` samples: merged in the paper's proportions ([`MergeOptions::of_bricks`]).
+    pub fn of_name(name: &str, side: BrickSide) -> Option<Trimming> {
+        Some(match name {
+            "conventional" => Trimming::Conventional,
+            "envelope" => Trimming::Envelope,
+            "visible" => Trimming::Visible,
+            "alone" => Trimming::Alone,
+            "merged" => Trimming::Merged(MergeOptions::of_bricks(side)),
+            "packed" => Trimming::Packed,
+            _ => return None,
+        })
+    }
+
     /// Whether the boxes of bricks are drawn, and not the whole bricks.
     fn draws_boxes(self) -> bool {
         !matches!(self, Trimming::Conventional | Trimming::Visible)
@@ -399,8 +415,7 @@ mod tests {
     }
 
     fn all(side: BrickSide) -> [Trimming; 6] {
-        let merged = Trimming::Merged(MergeOptions::of_bricks(side));
-        [Trimming::Conventional, Trimming::Envelope, Trimming::Visible, Trimming::Alone, merged, Trimming::Packed]
+        Trimming::NAMES.map(|name| Trimming::of_name(name, side).unwrap())
     }
 
     fn assert_like(found: &Image<f32>, expected: &Image<f32>, what: &str) {

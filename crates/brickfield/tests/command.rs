@@ -299,6 +299,18 @@ fn light_falls_on_bricks_and_on_blocks() {
 }
 
 #[test]
+fn trimmed_bricks_are_the_same_picture() {
+    let place = WorkFolder::new();
+    let whole = place.pixels("|--brick|16|--trim|conventional");
+    assert!(whole.iter().any(|c| *c > 0));
+    for how in ["envelope", "visible", "alone", "merged", "packed"] {
+        assert_eq!(place.pixels(&format!("|--brick|16|--trim|{how}")), whole, "{how}");
+    }
+    let said = place.rendered("a.png", "|--brick|16|--trim|packed");
+    assert!(said.contains("bricks of 16: 0 white, 1 grey, 0 black\nkept 0.0 of 0.0 MiB"), "{said}");
+}
+
+#[test]
 fn bricks_are_shown_over_the_picture_and_in_the_legend() {
     let place = WorkFolder::new();
     let (plain, shown) = (place.pixels(""), place.pixels("|--show-bricks"));

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use brickfield_conformance::compare::{CompareArgs, compare, parse, say, short_of};
 use brickfield_conformance::lamar::{LamarArgs, lamar};
+use brickfield_conformance::left_out::{LeftOutArgs, left_out};
 use brickfield_conformance::ljung::{LjungArgs, ljung};
 use brickfield_conformance::report::{Report, absences, table};
 use brickfield_conformance::tong::{TongArgs, tong};
@@ -12,6 +13,9 @@ use clap::Parser;
 fn main() -> ExitCode {
     if let Some(paper) = paper_of_command_line() {
         return of_paper(&paper);
+    }
+    if std::env::args().any(|word| word == "--left-out") {
+        return of_left_out(&LeftOutArgs::parse());
     }
     let args = parse(std::env::args_os().collect()).unwrap_or_else(|e| e.exit());
     match compare(&args) {
@@ -54,6 +58,20 @@ fn of_paper(paper: &str) -> ExitCode {
             }
             let fails = findings.missed.iter().any(|missed| check.contains(&missed.kind));
             ExitCode::from(if fails { 4 } else { 0 })
+        }
+        Err(e) => {
+            eprintln!("compare: {e}");
+            ExitCode::from(e.status())
+        }
+    }
+}
+
+/// What shaders leave out.
+fn of_left_out(args: &LeftOutArgs) -> ExitCode {
+    match left_out(args) {
+        Ok(complaints) => {
+            complaints.iter().for_each(|complaint| eprintln!("compare: {complaint}"));
+            ExitCode::from(if complaints.is_empty() { 0 } else { 4 })
         }
         Err(e) => {
             eprintln!("compare: {e}");

@@ -26,7 +26,10 @@ use super::rivals::RivalArgs;
 
 A paper's own comparisons have other options:
   compare --paper lamar --help
-  compare --paper lamar --part selection,seams"
+  compare --paper lamar --part selection,seams
+
+What the shader of a scene leaves out, and what that saves:
+  compare --left-out"
 )]
 pub struct CompareArgs {
     /// Volume file or folder; without it, the built-in phantom

@@ -49,6 +49,10 @@ pub enum PaperError {
     Pack(#[from] brickfield::PackError),
     #[error(transparent)]
     Fetch(#[from] brickfield::bricks::FetchError),
+    #[error(transparent)]
+    Shader(#[from] brickfield_shaders::ShaderError),
+    #[error("a backend that was there: {source}")]
+    Reopen { source: brickfield::BackendError },
     #[error("{backend} cannot evaluate single functions")]
     NoFunctions { backend: &'static str },
     #[error("{backend}: {source}")]

@@ -4,9 +4,9 @@ mod error;
 pub(crate) mod panels;
 mod subject;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use brickfield::frame::{Backend, Frame, FramePlan};
+use brickfield::frame::{Backend, Content, Frame, FramePlan, Resource};
 use brickfield::options::values;
 use brickfield::{write_exr, write_png};
 use brickfield_core::Image;
@@ -156,10 +156,14 @@ impl PaperArgs {
 
     /// Rows as a JSON file of the output folder.
     pub(crate) fn write_rows<R: serde::Serialize>(&self, name: &str, rows: &[R]) -> Result<(), PaperError> {
-        let path = self.out.join(name);
-        let json = serde_json::to_string_pretty(rows).expect("rows are plain data");
-        std::fs::write(&path, json).map_err(|source| PaperError::Out { path, source })
+        write_rows(&self.out.join(name), rows)
     }
+}
+
+/// Rows as a JSON file.
+pub(crate) fn write_rows<R: serde::Serialize>(path: &Path, rows: &[R]) -> Result<(), PaperError> {
+    let json = serde_json::to_string_pretty(rows).expect("rows are plain data");
+    std::fs::write(path, json).map_err(|source| PaperError::Out { path: path.to_owned(), source })
 }
 
 /// Behind transparent pixels.
@@ -205,6 +209,23 @@ pub(crate) fn frame_of(backend: &mut dyn Backend, plan: &FramePlan) -> Result<Fr
     let name = backend.describe().backend;
     backend.render(plan).map_err(|source| PaperError::Render { backend: name, source })
 }
+
+/// Bytes of everything that a plan brings to a device.
+pub(crate) fn device_bytes(plan: &FramePlan) -> u64 {
+    let of = |resource: Resource| match plan.content(resource) {
+        Some(Content::Bytes(bytes)) => bytes.len() as u64,
+        Some(Content::Chunks(chunks)) => chunks.n_bytes(),
+        Some(Content::Texture(slots)) => {
+            let room = slots.room(None, MOST_TEXELS).expect("a texture that backends take");
+            room.shape.texels().as_u64vec3().element_product() * slots.format().n_bytes() as u64
+        }
+        None => 0,
+    };
+    Resource::ALL.into_iter().map(of).sum()
+}
+
+/// Texels along a side of a texture: every Vulkan device takes so many.
+const MOST_TEXELS: u32 = 2048;
 
 /// A line on standard output.
 pub(crate) fn print(line: &str) -> Result<(), PaperError> {

@@ -1,13 +1,11 @@
 //! Peaks of memory: of the process, and of the device's textures and lists.
 
-use brickfield::frame::{Content, FramePlan, Resource};
-
 use super::TongArgs;
 use super::algorithm::Algorithm;
 use super::data::{Renderer, data_sets};
 use crate::compare::rivals::Rivals;
 use crate::memory::{peak, resident, restart_peak};
-use crate::paper::{Missed, PaperError, frame_of, mib, print};
+use crate::paper::{Missed, PaperError, device_bytes, frame_of, mib, print};
 
 pub(super) fn run(args: &TongArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, PaperError> {
     print(
@@ -55,18 +53,4 @@ pub(super) fn run(args: &TongArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, P
         }
     }
     Ok(Vec::new())
-}
-
-/// Bytes of everything that a plan brings to a device.
-fn device_bytes(plan: &FramePlan) -> u64 {
-    let of = |resource: Resource| match plan.content(resource) {
-        Some(Content::Bytes(bytes)) => bytes.len() as u64,
-        Some(Content::Chunks(chunks)) => chunks.n_bytes(),
-        Some(Content::Texture(slots)) => {
-            let room = slots.room(None, 2048).expect("a texture that backends take");
-            room.shape.texels().as_u64vec3().element_product() * slots.format().n_bytes() as u64
-        }
-        None => 0,
-    };
-    Resource::ALL.into_iter().map(of).sum()
 }

@@ -262,7 +262,10 @@ impl InputOptions {
 
     /// Opens a volume for pictures, with the transfer function that is asked for; what the reader noticed is printed. Uneven slices are
     /// made even.
-    fn open_to_render(
+    ///
+    /// # Errors
+    /// What the reader or the transfer function says.
+    pub fn open_to_render(
         &self,
         path: &Path,
         view: &ViewOptions,

@@ -15,7 +15,8 @@ use brickfield::options::{
     BlockArgs, Boxes, InputOptions, LightOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions, values,
 };
 use brickfield::overlay::LEVEL_COLORS;
-use brickfield::{AdapterInfo, BackendError, BackendKind, BackendStatus, Validation, backends};
+use brickfield::{AdapterInfo, BackendError, BackendKind, BackendStatus, Trimming, Validation, backends};
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
 
 /// Renders scalar volumes by multiresolution bricks, on the CPU, through wgpu and through raw Vulkan.
@@ -137,6 +138,12 @@ struct RenderArgs {
     light: LightOptions,
     #[command(flatten)]
     flat: BlockArgs,
+    /// Draw bricks of the finest level as far as they may be seen (Tong, Wang, Tsang and Tang 1999): alone, merged or packed (their
+    /// samples trimmed along one axis, merged into texture chunks, or trimmed along all axes), visible or envelope (whole
+    /// bricks), or conventional (everything); the same picture
+    #[arg(long, value_name = "HOW", conflicts_with_all = ["blocks", "show_bricks"],
+          value_parser = PossibleValuesParser::new(Trimming::NAMES), hide_possible_values = true)]
+    trim: Option<String>,
     #[arg(long, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "drawn",
           conflicts_with = "blocks", value_parser = values::boxes, help = show_bricks_help())]
     show_bricks: Option<Boxes>,

@@ -14,8 +14,8 @@ use brickfield::options::Blocks;
 use brickfield::options::{BlockSubject, Boxes, Subject, values};
 use brickfield::overlay::{LevelColor, show_bricks, show_bricks_faintly};
 use brickfield::{
-    BackendError, BackendKind, BlockResidency, Residency, Scene, Technique, check_picture_path, open_backend, prepare,
-    prepare_blocks, write_picture,
+    BackendError, BackendKind, BlockResidency, Residency, Scene, Technique, TrimResidency, TrimmedVolume, Trimming,
+    check_picture_path, open_backend, prepare, prepare_blocks, prepare_trimmed, write_picture,
 };
 
 use crate::{Failure, RenderArgs, mib, print};
@@ -29,6 +29,9 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let mut backend = open(args)?;
     if let Some(side) = args.flat.blocks {
         return render_blocks(args, side, backend.as_mut());
+    }
+    if let Some(trimming) = args.trim.as_deref().and_then(|name| Trimming::of_name(name, args.tree.brick)) {
+        return render_trimmed(args, trimming, backend.as_mut());
     }
     let subject = Subject::open(&args.file, &args.input, &args.tree, &args.view)?;
     let scene = args.sampling.of(args.view.scene(&subject)?, Some(&subject.volume))?;
@@ -71,6 +74,41 @@ fn render_blocks(args: &RenderArgs, side: BlockSide, backend: &mut dyn Backend) 
         print(&store_summary(store, frame.uploaded_bytes))?;
     }
     check_validation(&backend.validation_messages())
+}
+
+/// Renders trimmed bricks.
+fn render_trimmed(args: &RenderArgs, trimming: Trimming, backend: &mut dyn Backend) -> Result<(), Failure> {
+    let (volume, frame, transfer) = args.input.open_to_render(&args.file, &args.view)?;
+    let source = TrimmedVolume::new(Arc::new(volume), args.tree.brick);
+    let (volume, grid) = (source.volume(), source.volume().grid());
+    let scene = args.sampling.of(args.view.scene_of(grid, frame, &transfer)?, Some(volume))?;
+    let scene = args.light.of(scene, volume.range(), grid)?;
+    let mut residency = TrimResidency::default();
+    let plan = prepare_trimmed(&source, &scene, trimming, &mut residency).map_err(Failure::usage)?;
+    note_if_nothing_shows(&plan);
+    let frame = backend.render(&plan)?;
+    let attributes = attributes(args, backend, &scene, &plan);
+    write_picture(&args.out, &frame.image, args.view.background.0, &attributes)?;
+    print(&summary(backend, &scene, &plan, &frame))?;
+    print(&trim_summary(&source, &residency, &frame))?;
+    check_validation(&backend.validation_messages())
+}
+
+/// The classes of bricks, and the texels that their samples take.
+fn trim_summary(source: &TrimmedVolume, residency: &TrimResidency, frame: &Frame) -> String {
+    let (counts, account) = (residency.counts(), residency.account());
+    let bytes = |n_texels: u64| mib(n_texels * source.volume().scalar_type().n_bytes() as u64);
+    format!(
+        "bricks of {}: {} white, {} grey, {} black\nkept {:.1} of {:.1} MiB, {:.1} MiB of the texture free; uploaded {:.1} MiB\n",
+        source.layout().side(),
+        counts.n_white,
+        counts.n_grey,
+        counts.n_black,
+        bytes(account.n_samples),
+        bytes(source.volume().voxels().len() as u64),
+        bytes(account.n_padding()),
+        mib(frame.uploaded_bytes),
+    )
 }
 
 /// The blocks of each level, and their bytes.
