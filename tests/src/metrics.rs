@@ -141,6 +141,13 @@ fn pixel(size: UVec2, i: usize) -> UVec2 {
     UVec2::new(i as u32 % size.x, i as u32 / size.x)
 }
 
+/// The greatest difference of a channel between two pictures of one size; NaN if there is one.
+pub fn greatest_difference(a: &Image<f32>, b: &Image<f32>) -> f64 {
+    let channels = a.pixels().iter().flatten().zip(b.pixels().iter().flatten());
+    let differences = channels.map(|(a, b)| f64::from((a - b).abs()));
+    differences.fold(0.0, |most: f64, d| if d > most || d.is_nan() { d } else { most })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -236,5 +243,12 @@ mod tests {
             (quantile(values.clone(), 0.95), quantile(values.clone(), 1.0), quantile(values, 0.0)),
             (95.0, 100.0, 1.0)
         );
+    }
+
+    #[test]
+    fn the_greatest_difference_does_not_pass_over_nan() {
+        let image = |values: [f32; 2]| Image::new(UVec2::new(2, 1), values.map(|v| [v; 4]).to_vec()).unwrap();
+        assert_eq!(greatest_difference(&image([1.0, 2.0]), &image([1.5, 2.0])), 0.5);
+        assert!(greatest_difference(&image([f32::NAN, 2.0]), &image([1.5, 9.0])).is_nan());
     }
 }

@@ -58,7 +58,7 @@ impl Stage {
     }
 
     /// The light from a direction.
-    fn from_the_side(&self) -> Light {
+    fn light_from_the_side(&self) -> Light {
         let source = LightSource::Direction(DVec3::new(0.5, -0.7, 0.6));
         Light::new(source, self.light.terms(), self.light.flat_below()).expect("terms of a light")
     }
@@ -109,7 +109,7 @@ pub(super) fn scenes(size: UVec2) -> Result<Vec<LeftOutScene>, PaperError> {
         stage.with("unlit, nothing left out", Drawn::Octree, all)?,
         stage.with("unlit", Drawn::Octree, |_| ())?,
         stage.with("lit", Drawn::Octree, |s| s.light = Some(stage.light))?,
-        stage.with("lit from the side", Drawn::Octree, |s| s.light = Some(stage.from_the_side()))?,
+        stage.with("lit from the side", Drawn::Octree, |s| s.light = Some(stage.light_from_the_side()))?,
         stage.with("several resolutions", Drawn::Octree, |s| s.detail = vec![Criterion::Distance { factor: 0.25 }])?,
         stage.with("clip box", Drawn::Octree, |s| s.clip = Some(box_of_voxels))?,
         stage.with("polygons", Drawn::Octree, slices)?,
@@ -119,7 +119,7 @@ pub(super) fn scenes(size: UVec2) -> Result<Vec<LeftOutScene>, PaperError> {
         stage.with("blocks, blended", Drawn::Blocks(mixed.clone(), blended), |_| ())?,
         stage.with("blocks, prefiltered", Drawn::Blocks(mixed.clone(), prefiltered), |_| ())?,
         stage.with("everything", Drawn::Blocks(mixed, everything), |s| {
-            s.light = Some(stage.from_the_side().on_normals(Normals::Stored));
+            s.light = Some(stage.light_from_the_side().on_normals(Normals::Stored));
             s.clip = Some(box_of_voxels);
         })?,
     ])

@@ -12,7 +12,7 @@ use super::algorithm::Algorithm;
 use super::data::{DataSet, Renderer, data_sets};
 use super::samples::n_samples;
 use crate::compare::rivals::Rivals;
-use crate::metrics::median;
+use crate::metrics::{greatest_difference, median};
 use crate::paper::{Missed, PaperError, mib, print};
 use crate::turns::{Ratio, Spread, take_turns};
 
@@ -132,14 +132,9 @@ fn contest(
         processing_ms: prepared.processing_ms,
         ms: Spread::of(&ms[i]),
         ratio: Ratio::of(&ms[i], &ms[0]),
-        difference: difference(&pictures[i], &pictures[0]),
+        difference: greatest_difference(&pictures[i], &pictures[0]),
     };
     Ok(prepared.iter().enumerate().map(row).collect())
-}
-
-fn difference(a: &Image<f32>, b: &Image<f32>) -> f64 {
-    let channels = a.pixels().iter().flatten().zip(b.pixels().iter().flatten());
-    channels.map(|(a, b)| f64::from((a - b).abs())).fold(0.0, f64::max)
 }
 
 fn line(row: &TableRow) -> String {
