@@ -491,9 +491,16 @@ mod tests {
             division: brickfield_frame::Division::Brick,
             ..scene.clone()
         };
-        let n_polygons = |trimming| plan(&slices, trimming).unwrap().proxy().unwrap().n_polygons();
-        assert!(n_polygons(Trimming::Packed) < n_polygons(Trimming::Visible));
         assert!(!plan(&slices, Trimming::Packed).unwrap().features().contains(Feature::SkipDark));
+        let n_polygons = |trimming| {
+            let mut voxels = vec![0u8; 61 * 46 * 31];
+            voxels[7 + 61 * (7 + 46 * 7)] = 200;
+            let grid = *source.grid();
+            let source = TrimmedVolume::new(Arc::new(Volume::new(grid, voxels).unwrap()), BrickSide::S16);
+            let plan = prepare_trimmed(&source, &slices, trimming, &mut TrimResidency::default()).unwrap();
+            plan.proxy().unwrap().n_polygons()
+        };
+        assert!(n_polygons(Trimming::Packed) < n_polygons(Trimming::Visible));
         let too_small = MergeOptions::of_bricks(BrickSide::S16);
         let wide = TrimmedVolume::new(volume(UVec3::new(61, 46, 31), 3), BrickSide::S32);
         let refused = prepare_trimmed(&wide, &scene, Trimming::Merged(too_small), &mut TrimResidency::default());
