@@ -1,0 +1,4 @@
+//! Laws of the codec, on random and extreme bricks.
+
+mod bands;
+mod bricks;
