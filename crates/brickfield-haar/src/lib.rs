@@ -1,12 +1,26 @@
 #![doc = include_str!("../README.md")]
 
+mod bits;
+mod coded;
+mod context;
+mod decode;
+mod encode;
 mod extent;
+mod frequencies;
+mod header;
 mod kernel;
 mod median;
+mod packed;
+mod quantise;
 mod sample;
+mod tans;
+mod token;
 mod transform;
 
+pub use decode::{DecodeError, Decoded, decode, decode_level};
+pub use encode::{EncodeError, EncodeOptions, Loss, Storages, encode};
 pub use extent::{ExtentError, MAX_LEVELS, MAX_SAMPLES};
+pub use header::{BrickHeader, FORMAT_VERSION, Storage};
 pub use kernel::Kernel;
 pub use sample::{Coefficient, Sample};
 pub use transform::{Bands, TransformError};

@@ -6,12 +6,12 @@ use brickfield_haar::Sample;
 use proptest::prelude::*;
 
 /// The least and the greatest sample of a type, as i64.
-pub fn range<T: Sample>() -> (i64, i64) {
+pub(crate) fn range<T: Sample>() -> (i64, i64) {
     (T::saturate(i64::MIN).to_i64(), T::saturate(i64::MAX).to_i64())
 }
 
 /// Extents from 1 to 70 along each axis, of at most 6,000 samples.
-pub fn extents() -> impl Strategy<Value = UVec3> {
+pub(crate) fn extents() -> impl Strategy<Value = UVec3> {
     let any = (1..=70u32, 1..=70u32, 1..=70u32, 0..6usize);
     any.prop_map(|(x, y, z, order)| {
         let (y, z) = (y.min((6000 / x).max(1)), z);
@@ -22,7 +22,7 @@ pub fn extents() -> impl Strategy<Value = UVec3> {
 }
 
 /// Samples of a brick: noise of all values, the two extremes only, one value, smooth, smooth with noise, mostly one value.
-pub fn samples<T: Sample>(extent: UVec3) -> impl Strategy<Value = Vec<T>> {
+pub(crate) fn samples<T: Sample>(extent: UVec3) -> impl Strategy<Value = Vec<T>> {
     let n = extent.element_product() as usize;
     (0..6u8, any::<u64>(), any::<i64>()).prop_map(move |(kind, seed, value)| {
         let (least, greatest) = range::<T>();
@@ -55,7 +55,7 @@ pub fn samples<T: Sample>(extent: UVec3) -> impl Strategy<Value = Vec<T>> {
 }
 
 /// A brick: extent and samples.
-pub fn bricks<T: Sample>() -> impl Strategy<Value = (UVec3, Vec<T>)> {
+pub(crate) fn bricks<T: Sample>() -> impl Strategy<Value = (UVec3, Vec<T>)> {
     extents().prop_flat_map(|extent| (Just(extent), samples(extent)))
 }
 
@@ -105,7 +105,7 @@ macro_rules! for_all_types {
 }
 
 /// Runs a law on many cases of a strategy.
-pub fn hold<S: Strategy>(n_cases: u32, strategy: S, law: impl Fn(S::Value) -> Result<(), TestCaseError>) {
+pub(crate) fn hold<S: Strategy>(n_cases: u32, strategy: S, law: impl Fn(S::Value) -> Result<(), TestCaseError>) {
     let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig::with_cases(n_cases));
     if let Err(error) = runner.run(&strategy, law) {
         panic!("{error}");
@@ -113,6 +113,6 @@ pub fn hold<S: Strategy>(n_cases: u32, strategy: S, law: impl Fn(S::Value) -> Re
 }
 
 /// The type's name, for messages.
-pub fn name<T: Scalar>() -> &'static str {
+pub(crate) fn name<T: Scalar>() -> &'static str {
     T::TYPE.name()
 }

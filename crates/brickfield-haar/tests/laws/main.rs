@@ -2,3 +2,4 @@
 
 mod bands;
 mod bricks;
+mod codec;

@@ -1,0 +1,375 @@
+//! Boxes of coefficients as bits, by tokens whose probabilities depend on their contexts.
+//!
+//! A section is a string of bits: the first states of nine lanes, 11 bits each, then rows in ascending order. A row begins with its
+//! flag, in lane 8: 1 if all is 0. Otherwise coefficient x follows in lane x modulo 8: the bits of its state, then those of its token.
+//! After the last row all states are 0.
+
+use brickfield_core::Level;
+use brickfield_core::glam::UVec3;
+
+use crate::bits::{BitReader, BitWriter, low_bits};
+use crate::context::{N_CLASSES, N_CONTEXTS, Neighbours};
+use crate::extent::BandBox;
+use crate::frequencies::{
+    LOG_TOTAL, N_MAGNITUDE_TABLES, N_SYMBOLS, N_TABLES, TOTAL, best_flag_table, best_magnitude_table,
+};
+use crate::median::{differences, undo_differences};
+use crate::sample::Coefficient;
+use crate::tans::{DecodeTable, EncodeTable, Entry, decode_table, encode_table};
+use crate::token::{ESCAPE, N_TOKENS, first_magnitude, n_bits, token_of};
+use crate::transform::Bands;
+
+/// Lanes of coefficients; one more is for flags.
+const N_LANES: usize = 8;
+const FLAG_LANE: u8 = N_LANES as u8;
+/// The bits of a table's number.
+const N_NUMBER_BITS: u32 = 10;
+/// The bytes of a model.
+pub(crate) const N_MODEL_BYTES: usize = (N_CONTEXTS * N_NUMBER_BITS as usize).div_ceil(8);
+
+/// The number of a table for each context.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Model([u16; N_CONTEXTS]);
+
+impl Model {
+    /// The model of its bytes, or `None` if they name a table that no context of the kind has.
+    pub(crate) fn from_bytes(bytes: &[u8]) -> Option<Model> {
+        let mut reader = BitReader::new(bytes);
+        let numbers = std::array::from_fn(|_| reader.take(N_NUMBER_BITS) as u16);
+        let is_right = |(context, &number): (usize, &u16)| match context < N_CLASSES {
+            true => usize::from(number) < N_MAGNITUDE_TABLES,
+            false => (N_MAGNITUDE_TABLES..N_TABLES).contains(&usize::from(number)),
+        };
+        (reader.is_at_end() && numbers.iter().enumerate().all(is_right)).then_some(Model(numbers))
+    }
+
+    pub(crate) fn to_bytes(self) -> Vec<u8> {
+        let mut writer = BitWriter::default();
+        self.0.iter().for_each(|&number| writer.push(u64::from(number), N_NUMBER_BITS));
+        writer.into_bytes()
+    }
+
+    fn encode_tables(&self) -> [&'static EncodeTable; N_CONTEXTS] {
+        self.0.map(|number| encode_table(usize::from(number)))
+    }
+
+    fn decode_tables(&self) -> [&'static DecodeTable; N_CONTEXTS] {
+        self.0.map(|number| decode_table(usize::from(number)))
+    }
+}
+
+/// A flag or a coefficient, as it will be coded.
+#[derive(Clone, Copy, Debug)]
+struct Symbol<C> {
+    value: C,
+    token: u8,
+    context: u8,
+    lane: u8,
+}
+
+/// The symbols of all sections of a brick, coarsest first, and the model that suits them.
+#[derive(Debug)]
+pub(crate) struct Symbols<C> {
+    sections: Vec<Vec<Symbol<C>>>,
+    model: Model,
+    n_bits: f32,
+}
+
+impl<C: Coefficient> Symbols<C> {
+    /// The low band as differences of the median kernel, then the details of each level.
+    pub(crate) fn of(bands: &Bands<C>) -> Symbols<C> {
+        let mut counts = Counts { of_tokens: [[0; N_SYMBOLS]; N_CONTEXTS], n_bits: 0 };
+        let n = bands.extent(Level(bands.n_levels()));
+        let low = differences(n, bands.low());
+        let mut sections = vec![section(&low, n, std::iter::once(BandBox::whole(n)), &mut counts)];
+        for level in (0..bands.n_levels()).rev() {
+            let n = bands.extent(Level(level));
+            sections.push(section(bands.details(Level(level)), n, BandBox::details(n), &mut counts));
+        }
+        let (model, n_bits) = counts.best_model();
+        Symbols { sections, model, n_bits }
+    }
+
+    /// About how many bytes [`Symbols::encode`] will make.
+    pub(crate) fn estimated_bytes(&self) -> usize {
+        let n_state_bits = self.sections.len() * (N_LANES + 1) * LOG_TOTAL as usize;
+        N_MODEL_BYTES + (self.n_bits as usize + n_state_bits).div_ceil(8)
+    }
+
+    /// The model, and the bytes of each section.
+    pub(crate) fn encode(&self) -> (Model, Vec<Vec<u8>>) {
+        let tables = self.model.encode_tables();
+        (self.model, self.sections.iter().map(|symbols| encode_section(symbols, &tables)).collect())
+    }
+}
+
+/// How often each token comes in each context, and the bits that follow the tokens.
+struct Counts {
+    of_tokens: [[u32; N_SYMBOLS]; N_CONTEXTS],
+    n_bits: usize,
+}
+
+impl Counts {
+    fn best_model(&self) -> (Model, f32) {
+        let mut n_bits = self.n_bits as f32;
+        let numbers = std::array::from_fn(|context| {
+            let counts = &self.of_tokens[context];
+            let (number, n) = if context < N_CLASSES { best_magnitude_table(counts) } else { best_flag_table(counts) };
+            n_bits += n;
+            number as u16
+        });
+        (Model(numbers), n_bits)
+    }
+}
+
+/// The symbols of some boxes of an array of extent `all`.
+fn section<C: Coefficient>(
+    array: &[C],
+    all: UVec3,
+    boxes: impl Iterator<Item = BandBox>,
+    counts: &mut Counts,
+) -> Vec<Symbol<C>> {
+    let mut symbols = Vec::with_capacity(array.len());
+    let mut classes = vec![0; all.x as usize];
+    for band in boxes {
+        let [nx, ny, nz] = band.n.to_array().map(|n| n as usize);
+        let mut neighbours = Neighbours::new(nx, ny);
+        for (z, y) in (0..nz).flat_map(|z| (0..ny).map(move |y| (z, y))) {
+            let row = &array[band.row(all, y, z)..][..nx];
+            let is_zero = row.iter().all(|&c| c == C::default());
+            let flag_context = neighbours.flag_context();
+            counts.of_tokens[flag_context][usize::from(is_zero)] += 1;
+            let token = u8::from(is_zero);
+            symbols.push(Symbol { value: C::default(), token, context: flag_context as u8, lane: FLAG_LANE });
+            if is_zero {
+                neighbours.pass_zero();
+                continue;
+            }
+            neighbours.classes(&mut classes[..nx]);
+            for (x, (&value, &context)) in row.iter().zip(&classes).enumerate() {
+                let token = token_of(value.magnitude());
+                counts.of_tokens[usize::from(context)][usize::from(token)] += 1;
+                counts.n_bits += n_following_bits(token, value.magnitude());
+                symbols.push(Symbol { value, token, context, lane: (x % N_LANES) as u8 });
+            }
+            neighbours.pass_row(row.iter().map(|c| c.short_magnitude()));
+        }
+    }
+    symbols
+}
+
+fn n_following_bits(token: u8, magnitude: u64) -> usize {
+    match token {
+        ESCAPE => 1 + magnitude.ilog2() as usize,
+        _ => n_bits(token) as usize,
+    }
+}
+
+fn encode_section<C: Coefficient>(symbols: &[Symbol<C>], tables: &[&EncodeTable; N_CONTEXTS]) -> Vec<u8> {
+    let mut states = [0u16; N_LANES + 1];
+    let mut steps = Vec::with_capacity(symbols.len());
+    for symbol in symbols.iter().rev() {
+        let table = tables[usize::from(symbol.context)];
+        let token = table.symbol(symbol.token);
+        let state = &mut states[usize::from(symbol.lane)];
+        let (before, bits, n) = table.step_back(token, *state);
+        *state = before;
+        steps.push((token, bits, n));
+    }
+    let mut writer = BitWriter::default();
+    states.iter().for_each(|&state| writer.push(u64::from(state), LOG_TOTAL));
+    for (symbol, (token, bits, n)) in symbols.iter().zip(steps.into_iter().rev()) {
+        writer.push(u64::from(bits), n);
+        if symbol.lane != FLAG_LANE {
+            write_rest(&mut writer, token, symbol.value);
+        }
+    }
+    writer.into_bytes()
+}
+
+/// The bits that follow a token.
+#[inline]
+fn write_rest<C: Coefficient>(writer: &mut BitWriter, token: u8, value: C) {
+    let (magnitude, sign) = (value.magnitude(), u64::from(value < C::default()));
+    match token {
+        0 => {}
+        ESCAPE => write_escaped(writer, magnitude, sign),
+        _ => writer.push((magnitude - u64::from(first_magnitude(token))) << 1 | sign, n_bits(token)),
+    }
+}
+
+/// The number of the magnitude's bits in 6 bits, the sign, and the bits below the highest one, in two parts. The magnitude is from 1 to
+/// 2^63 - 1.
+fn write_escaped(writer: &mut BitWriter, magnitude: u64, sign: u64) {
+    let n_below = magnitude.ilog2();
+    let below = low_bits(magnitude, n_below);
+    writer.push(u64::from(n_below + 1), 6);
+    writer.push(sign, 1);
+    writer.push(low_bits(below, 32), n_below.min(32));
+    writer.push(below >> 32, n_below.saturating_sub(32));
+}
+
+/// Undoes [`write_escaped`]; 0 bits make 0.
+#[cold]
+fn read_escaped(reader: &mut BitReader<'_>) -> i64 {
+    let n = reader.take(6) as u32;
+    let is_negative = reader.take(1) == 1;
+    let n_below = n.saturating_sub(1);
+    let lower = reader.take(n_below.min(32));
+    let upper = reader.take(n_below.saturating_sub(32));
+    let highest = if n == 0 { 0 } else { 1 << n_below };
+    let magnitude = highest | (upper << 32 | lower) as i64;
+    if is_negative { -magnitude } else { magnitude }
+}
+
+/// A section of which no coefficients can be made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct BrokenSection;
+
+/// Decodes the section with the low band.
+pub(crate) fn decode_low<C: Coefficient>(
+    bands: &mut Bands<C>,
+    bytes: &[u8],
+    model: &Model,
+) -> Result<(), BrokenSection> {
+    let n = bands.extent(Level(bands.n_levels()));
+    decode_section(bands.low_mut(), n, std::iter::once(BandBox::whole(n)), bytes, model)?;
+    undo_differences(n, bands.low_mut());
+    Ok(())
+}
+
+/// Decodes the section with the details of a level.
+pub(crate) fn decode_details<C: Coefficient>(
+    bands: &mut Bands<C>,
+    level: Level,
+    bytes: &[u8],
+    model: &Model,
+) -> Result<(), BrokenSection> {
+    let n = bands.extent(level);
+    decode_section(bands.details_mut(level), n, BandBox::details(n), bytes, model)
+}
+
+fn decode_section<C: Coefficient>(
+    array: &mut [C],
+    all: UVec3,
+    boxes: impl Iterator<Item = BandBox>,
+    bytes: &[u8],
+    model: &Model,
+) -> Result<(), BrokenSection> {
+    let tables = model.decode_tables();
+    let mut decoder = Decoder::new(bytes, &tables);
+    let mut classes = vec![0; all.x as usize];
+    for band in boxes {
+        let [nx, ny, nz] = band.n.to_array().map(|n| n as usize);
+        let mut neighbours = Neighbours::new(nx, ny);
+        for (z, y) in (0..nz).flat_map(|z| (0..ny).map(move |y| (z, y))) {
+            let row = &mut array[band.row(all, y, z)..][..nx];
+            if decoder.flag(neighbours.flag_context()) {
+                row.fill(C::default());
+                neighbours.pass_zero();
+                continue;
+            }
+            let classes = &mut classes[..nx];
+            neighbours.classes(classes);
+            decoder.row(classes, row)?;
+            neighbours.pass_row(row.iter().map(|c| c.short_magnitude()));
+        }
+    }
+    if decoder.is_finished() { Ok(()) } else { Err(BrokenSection) }
+}
+
+/// The states of all lanes, and the bits to come.
+struct Decoder<'a> {
+    reader: BitReader<'a>,
+    tables: &'a [&'static DecodeTable; N_CONTEXTS],
+    of_class: [&'static DecodeTable; N_CLASSES],
+    states: [u16; N_LANES],
+    flag_state: u16,
+}
+
+/// The first magnitude of each token, as far as a token can be stored.
+static FIRST_MAGNITUDES: [u32; 64] = {
+    let mut first = [0; 64];
+    let mut token = 0;
+    while token < N_TOKENS {
+        first[token] = first_magnitude(token as u8);
+        token += 1;
+    }
+    first
+};
+
+impl<'a> Decoder<'a> {
+    fn new(bytes: &'a [u8], tables: &'a [&'static DecodeTable; N_CONTEXTS]) -> Decoder<'a> {
+        let mut reader = BitReader::new(bytes);
+        let states = std::array::from_fn(|_| reader.take(LOG_TOTAL) as u16);
+        let flag_state = reader.take(LOG_TOTAL) as u16;
+        let of_class = std::array::from_fn(|class| tables[class]);
+        Decoder { reader, tables, of_class, states, flag_state }
+    }
+
+    #[inline(always)]
+    fn flag(&mut self, context: usize) -> bool {
+        let entry = self.tables[context][usize::from(self.flag_state)];
+        self.flag_state = entry.next_state(self.reader.window());
+        self.reader.skip(entry.n_state_bits());
+        entry.token() == 1
+    }
+
+    /// Decodes a row, whose classes are below [`N_CLASSES`].
+    #[inline(always)]
+    fn row<C: Coefficient>(&mut self, classes: &[u8], row: &mut [C]) -> Result<(), BrokenSection> {
+        let (mut reader, mut states) = (self.reader, self.states);
+        let mut groups = row.chunks_exact_mut(N_LANES);
+        let mut groups_of_classes = classes.chunks_exact(N_LANES);
+        for (group, classes) in groups.by_ref().zip(groups_of_classes.by_ref()) {
+            for pair in 0..N_LANES / 2 {
+                let mut window = reader.window();
+                for lane in [2 * pair, 2 * pair + 1] {
+                    group[lane] =
+                        coefficient(&self.of_class, classes[lane], &mut states[lane], &mut reader, &mut window);
+                }
+            }
+            if reader.is_beyond_end() {
+                return Err(BrokenSection);
+            }
+        }
+        let rest = groups.into_remainder().iter_mut().zip(groups_of_classes.remainder());
+        for ((value, &class), state) in rest.zip(&mut states) {
+            let mut window = reader.window();
+            *value = coefficient(&self.of_class, class, state, &mut reader, &mut window);
+        }
+        (self.reader, self.states) = (reader, states);
+        if reader.is_beyond_end() { Err(BrokenSection) } else { Ok(()) }
+    }
+
+    /// Whether nothing is left, and all states are those that encoding began with.
+    fn is_finished(&self) -> bool {
+        self.reader.is_at_end() && self.flag_state == 0 && self.states == [0; N_LANES]
+    }
+}
+
+/// Decodes one coefficient. The window holds the reader's next bits, at least 28 of them, and is moved with it.
+#[inline(always)]
+fn coefficient<C: Coefficient>(
+    tables: &[&'static DecodeTable; N_CLASSES],
+    class: u8,
+    state: &mut u16,
+    reader: &mut BitReader<'_>,
+    window: &mut u64,
+) -> C {
+    let entry: Entry = tables[usize::from(class) % N_CLASSES][usize::from(*state) % TOTAL as usize];
+    *state = entry.next_state(*window);
+    let (n_state, n_token) = (entry.n_state_bits(), entry.n_token_bits());
+    let rest = *window >> n_state;
+    reader.skip(n_state + n_token);
+    if entry.token() == ESCAPE {
+        let value = read_escaped(reader);
+        *window = reader.window();
+        return C::wrap_from(value);
+    }
+    *window = rest >> n_token;
+    let bits = low_bits(rest, n_token);
+    let magnitude = i64::from(FIRST_MAGNITUDES[usize::from(entry.token())]) + (bits >> 1) as i64;
+    let negative = -((bits & 1) as i64);
+    C::wrap_from((magnitude ^ negative) - negative)
+}

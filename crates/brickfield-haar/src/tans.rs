@@ -1,0 +1,148 @@
+//! Asymmetric numeral systems by tables (Duda 2013, tANS): symbols to bits by their frequencies.
+//!
+//! The state is a number below 2^11. To decode a symbol: look up the state; the entry has the symbol, and how many bits to read, which
+//! are added to the entry's base to make the next state. Encoding goes backwards, from the last symbol to the first.
+
+use std::sync::OnceLock;
+
+use crate::bits::low_bits;
+use crate::frequencies::{Frequencies, LOG_TOTAL, N_SYMBOLS, N_TABLES, TOTAL, frequencies};
+use crate::token::{ESCAPE, n_bits};
+
+/// What a state means: from the lowest bit on, the bits of the state (4), the bits that follow the token (5), token (6), base (11).
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Entry(u32);
+
+impl Entry {
+    fn new(token: u8, n_state_bits: u32, base: u32) -> Entry {
+        let n_token_bits = if token == ESCAPE { 0 } else { n_bits(token) };
+        Entry(n_state_bits | n_token_bits << 4 | u32::from(token) << 9 | base << 15)
+    }
+
+    #[inline(always)]
+    pub(crate) fn n_state_bits(self) -> u32 {
+        self.0 & 15
+    }
+
+    #[inline(always)]
+    pub(crate) fn n_token_bits(self) -> u32 {
+        self.0 >> 4 & 31
+    }
+
+    #[inline(always)]
+    pub(crate) fn token(self) -> u8 {
+        (self.0 >> 9 & 63) as u8
+    }
+
+    /// The next state, from the bits that are read.
+    #[inline(always)]
+    pub(crate) fn next_state(self, window: u64) -> u16 {
+        ((self.0 >> 15) as u64 + low_bits(window, self.n_state_bits())) as u16
+    }
+}
+
+/// The entries of all states.
+pub(crate) type DecodeTable = [Entry; TOTAL as usize];
+
+/// From symbols to states.
+#[derive(Debug)]
+pub(crate) struct EncodeTable {
+    frequencies: Frequencies,
+    /// Where the states of each symbol begin in `states`.
+    first: [u16; N_SYMBOLS],
+    /// The states of all symbols, each symbol's in ascending order.
+    states: Vec<u16>,
+}
+
+/// The decoding table of a number below [`N_TABLES`].
+pub(crate) fn decode_table(number: usize) -> &'static DecodeTable {
+    static TABLES: [OnceLock<Box<DecodeTable>>; N_TABLES] = [const { OnceLock::new() }; N_TABLES];
+    TABLES[number].get_or_init(|| Box::new(new_decode_table(&frequencies(number))))
+}
+
+/// The encoding table of a number below [`N_TABLES`].
+pub(crate) fn encode_table(number: usize) -> &'static EncodeTable {
+    static TABLES: [OnceLock<EncodeTable>; N_TABLES] = [const { OnceLock::new() }; N_TABLES];
+    TABLES[number].get_or_init(|| new_encode_table(&frequencies(number)))
+}
+
+/// The symbol of each state: symbols in ascending order, each as often as its frequency, are laid on the states at steps of
+/// 5/8 of their number plus 3, modulo it.
+fn spread(frequencies: &Frequencies) -> [u8; TOTAL as usize] {
+    const STEP: usize = (TOTAL as usize / 8) * 5 + 3;
+    let mut symbols = [0; TOTAL as usize];
+    let mut state = 0;
+    for (symbol, &frequency) in frequencies.iter().enumerate() {
+        for _ in 0..frequency {
+            symbols[state] = symbol as u8;
+            state = (state + STEP) % TOTAL as usize;
+        }
+    }
+    symbols
+}
+
+fn new_decode_table(frequencies: &Frequencies) -> DecodeTable {
+    let mut next = frequencies.map(u32::from);
+    spread(frequencies).map(|symbol| {
+        let x = next[usize::from(symbol)];
+        next[usize::from(symbol)] += 1;
+        let n_state_bits = LOG_TOTAL - x.ilog2();
+        Entry::new(symbol, n_state_bits, (x << n_state_bits) - TOTAL)
+    })
+}
+
+fn new_encode_table(frequencies: &Frequencies) -> EncodeTable {
+    let mut first = [0; N_SYMBOLS];
+    for symbol in 1..N_SYMBOLS {
+        first[symbol] = first[symbol - 1] + frequencies[symbol - 1];
+    }
+    let mut next = first;
+    let mut states = vec![0; TOTAL as usize];
+    for (state, symbol) in spread(frequencies).into_iter().enumerate() {
+        states[usize::from(next[usize::from(symbol)])] = state as u16;
+        next[usize::from(symbol)] += 1;
+    }
+    EncodeTable { frequencies: *frequencies, first, states }
+}
+
+impl EncodeTable {
+    /// The symbol that stands for a token: itself or the escape.
+    #[inline]
+    pub(crate) fn symbol(&self, token: u8) -> u8 {
+        if self.frequencies[usize::from(token)] == 0 { ESCAPE } else { token }
+    }
+
+    /// The state before a symbol, from the state behind it; and the bits that lead from one to the other, with their number.
+    #[inline]
+    pub(crate) fn step_back(&self, symbol: u8, state: u16) -> (u16, u32, u32) {
+        let symbol = usize::from(symbol);
+        let frequency = u32::from(self.frequencies[symbol]);
+        let x = u32::from(state) + TOTAL;
+        // The number of bits with which x >> n lies in frequency .. 2 frequency.
+        let n = LOG_TOTAL - frequency.ilog2();
+        let n = if x >> n < frequency { n - 1 } else { n };
+        let index = u32::from(self.first[symbol]) + (x >> n) - frequency;
+        (self.states[index as usize], x & ((1 << n) - 1), n)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every state behind every symbol is reached again by decoding from the state before it.
+    #[test]
+    fn a_step_forward_undoes_a_step_back() {
+        for number in [0, 31, 100, 500, 895, 896, 955] {
+            let (encode, decode) = (encode_table(number), decode_table(number));
+            for symbol in (0..N_SYMBOLS as u8).filter(|&s| encode.frequencies[usize::from(s)] > 0) {
+                for state in 0..TOTAL as u16 {
+                    let (before, bits, n) = encode.step_back(symbol, state);
+                    let entry = decode[usize::from(before)];
+                    assert_eq!((entry.token(), entry.n_state_bits()), (symbol, n), "table {number}");
+                    assert_eq!(entry.next_state(u64::from(bits)), state, "table {number}");
+                }
+            }
+        }
+    }
+}
