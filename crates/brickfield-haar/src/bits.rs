@@ -10,24 +10,23 @@ pub(crate) struct BitWriter {
 }
 
 impl BitWriter {
-    /// Appends the lower `n` bits of `value`, at most 56; its other bits must be 0.
+    /// Appends the lower `n` bits of `value`, at most 32; its other bits must be 0.
     #[inline]
     pub(crate) fn push(&mut self, value: u64, n: u32) {
-        debug_assert!(n <= 56 && value >> n == 0);
+        debug_assert!(n <= 32 && value >> n == 0);
         self.pending |= value << self.n_pending;
         self.n_pending += n;
-        while self.n_pending >= 8 {
-            self.bytes.push(self.pending as u8);
-            self.pending >>= 8;
-            self.n_pending -= 8;
+        if self.n_pending >= 32 {
+            self.bytes.extend((self.pending as u32).to_le_bytes());
+            self.pending >>= 32;
+            self.n_pending -= 32;
         }
     }
 
     /// The bytes; the last one is filled up with zero bits.
     pub(crate) fn into_bytes(mut self) -> Vec<u8> {
-        if self.n_pending > 0 {
-            self.bytes.push(self.pending as u8);
-        }
+        let n_bytes = self.n_pending.div_ceil(8) as usize;
+        self.bytes.extend(&self.pending.to_le_bytes()[..n_bytes]);
         self.bytes
     }
 }
@@ -102,7 +101,7 @@ mod tests {
     proptest! {
         #[test]
         fn bits_are_read_as_written(values: Vec<(u64, u8)>) {
-            let values: Vec<(u64, u32)> = values.iter().map(|&(v, n)| (low_bits(v, u32::from(n % 57)), u32::from(n % 57))).collect();
+            let values: Vec<(u64, u32)> = values.iter().map(|&(v, n)| (low_bits(v, u32::from(n % 33)), u32::from(n % 33))).collect();
             let mut writer = BitWriter::default();
             values.iter().for_each(|&(value, n)| writer.push(value, n));
             let bytes = writer.into_bytes();

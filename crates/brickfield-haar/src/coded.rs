@@ -1,6 +1,6 @@
 //! Boxes of coefficients as bits, by tokens whose probabilities depend on their contexts.
 //!
-//! A section is a string of bits: the first states of nine lanes, 11 bits each, then rows in ascending order. A row begins with its
+//! A section is a string of bits: the first states of nine lanes, 10 bits each, then rows in ascending order. A row begins with its
 //! flag, in lane 8: 1 if all is 0. Otherwise coefficient x follows in lane x modulo 8: the bits of its state, then those of its token.
 //! After the last row all states are 0.
 
@@ -158,6 +158,7 @@ fn section<C: Coefficient>(
     symbols
 }
 
+#[inline(always)]
 fn n_following_bits(token: u8, magnitude: u64) -> usize {
     match token {
         ESCAPE => 1 + magnitude.ilog2() as usize,
@@ -211,6 +212,7 @@ fn write_escaped(writer: &mut BitWriter, magnitude: u64, sign: u64) {
 
 /// Undoes [`write_escaped`]; 0 bits make 0.
 #[cold]
+#[inline(never)]
 fn read_escaped(reader: &mut BitReader<'_>) -> i64 {
     let n = reader.take(6) as u32;
     let is_negative = reader.take(1) == 1;
@@ -288,11 +290,11 @@ struct Decoder<'a> {
 }
 
 /// The first magnitude of each token, as far as a token can be stored.
-static FIRST_MAGNITUDES: [u32; 64] = {
+static FIRST_MAGNITUDES: [i32; 64] = {
     let mut first = [0; 64];
     let mut token = 0;
     while token < N_TOKENS {
-        first[token] = first_magnitude(token as u8);
+        first[token] = first_magnitude(token as u8) as i32;
         token += 1;
     }
     first
@@ -322,12 +324,11 @@ impl<'a> Decoder<'a> {
         let mut groups = row.chunks_exact_mut(N_LANES);
         let mut groups_of_classes = classes.chunks_exact(N_LANES);
         for (group, classes) in groups.by_ref().zip(groups_of_classes.by_ref()) {
-            for pair in 0..N_LANES / 2 {
-                let mut window = reader.window();
-                for lane in [2 * pair, 2 * pair + 1] {
-                    group[lane] =
-                        coefficient(&self.of_class, classes[lane], &mut states[lane], &mut reader, &mut window);
-                }
+            let group: &mut [C; N_LANES] = group.try_into().expect("a whole group");
+            let entries: [Entry; N_LANES] = std::array::from_fn(|lane| self.entry(classes[lane], states[lane]));
+            match entries.iter().any(|entry| entry.is_escape()) {
+                true => each_escaped(group, &entries, &mut states, &mut reader),
+                false => each(group, &entries, &mut states, &mut reader),
             }
             if reader.is_beyond_end() {
                 return Err(BrokenSection);
@@ -335,11 +336,15 @@ impl<'a> Decoder<'a> {
         }
         let rest = groups.into_remainder().iter_mut().zip(groups_of_classes.remainder());
         for ((value, &class), state) in rest.zip(&mut states) {
-            let mut window = reader.window();
-            *value = coefficient(&self.of_class, class, state, &mut reader, &mut window);
+            *value = one(self.entry(class, *state), state, &mut reader);
         }
         (self.reader, self.states) = (reader, states);
         if reader.is_beyond_end() { Err(BrokenSection) } else { Ok(()) }
+    }
+
+    #[inline(always)]
+    fn entry(&self, class: u8, state: u16) -> Entry {
+        self.of_class[usize::from(class) % N_CLASSES][usize::from(state) % TOTAL as usize]
     }
 
     /// Whether nothing is left, and all states are those that encoding began with.
@@ -348,28 +353,54 @@ impl<'a> Decoder<'a> {
     }
 }
 
-/// Decodes one coefficient. The window holds the reader's next bits, at least 28 of them, and is moved with it.
+/// Decodes a group, none of which is an escape: two have at most 54 bits, which one window holds.
 #[inline(always)]
-fn coefficient<C: Coefficient>(
-    tables: &[&'static DecodeTable; N_CLASSES],
-    class: u8,
-    state: &mut u16,
+fn each<C: Coefficient>(
+    group: &mut [C; N_LANES],
+    entries: &[Entry; N_LANES],
+    states: &mut [u16; N_LANES],
     reader: &mut BitReader<'_>,
-    window: &mut u64,
-) -> C {
-    let entry: Entry = tables[usize::from(class) % N_CLASSES][usize::from(*state) % TOTAL as usize];
-    *state = entry.next_state(*window);
-    let (n_state, n_token) = (entry.n_state_bits(), entry.n_token_bits());
-    let rest = *window >> n_state;
-    reader.skip(n_state + n_token);
-    if entry.token() == ESCAPE {
-        let value = read_escaped(reader);
-        *window = reader.window();
-        return C::wrap_from(value);
+) {
+    for pair in 0..N_LANES / 2 {
+        let (a, b) = (2 * pair, 2 * pair + 1);
+        let window = reader.window();
+        states[a] = entries[a].next_state(window);
+        group[a] = plain(entries[a], window);
+        let window = window >> entries[a].n_all_bits();
+        states[b] = entries[b].next_state(window);
+        group[b] = plain(entries[b], window);
+        reader.skip(entries[a].n_all_bits() + entries[b].n_all_bits());
     }
-    *window = rest >> n_token;
-    let bits = low_bits(rest, n_token);
-    let magnitude = i64::from(FIRST_MAGNITUDES[usize::from(entry.token())]) + (bits >> 1) as i64;
-    let negative = -((bits & 1) as i64);
-    C::wrap_from((magnitude ^ negative) - negative)
+}
+
+/// Decodes a group with an escape.
+#[cold]
+#[inline(never)]
+fn each_escaped<C: Coefficient>(
+    group: &mut [C; N_LANES],
+    entries: &[Entry; N_LANES],
+    states: &mut [u16; N_LANES],
+    reader: &mut BitReader<'_>,
+) {
+    for ((value, &entry), state) in group.iter_mut().zip(entries).zip(states) {
+        *value = one(entry, state, reader);
+    }
+}
+
+/// Decodes one coefficient.
+#[inline(always)]
+fn one<C: Coefficient>(entry: Entry, state: &mut u16, reader: &mut BitReader<'_>) -> C {
+    let window = reader.window();
+    *state = entry.next_state(window);
+    reader.skip(entry.n_all_bits());
+    if entry.is_escape() { C::wrap_from(read_escaped(reader)) } else { plain(entry, window) }
+}
+
+/// The coefficient of an entry that is no escape.
+#[inline(always)]
+fn plain<C: Coefficient>(entry: Entry, window: u64) -> C {
+    let bits = entry.token_bits(window);
+    let magnitude = FIRST_MAGNITUDES[usize::from(entry.token())] + (bits >> 1) as i32;
+    let negative = -((bits & 1) as i32);
+    C::wrap_from(i64::from((magnitude ^ negative) - negative))
 }

@@ -58,6 +58,7 @@ impl BandBox {
     }
 
     /// Where row (y, z) of the box begins in an array of extent `all`.
+    #[inline]
     pub(crate) fn row(&self, all: UVec3, y: usize, z: usize) -> usize {
         let [fx, fy, fz] = self.first.to_array().map(|i| i as usize);
         fx + all.x as usize * (fy + y + all.y as usize * (fz + z))

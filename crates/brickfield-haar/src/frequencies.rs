@@ -8,8 +8,8 @@ use std::sync::OnceLock;
 
 use crate::token::{ESCAPE, N_TOKENS, first_magnitude, n_magnitudes};
 
-/// Frequencies of a table add up to 2^11.
-pub(crate) const LOG_TOTAL: u32 = 11;
+/// Frequencies of a table add up to 2^10.
+pub(crate) const LOG_TOTAL: u32 = 10;
 /// What frequencies of a table add up to.
 pub(crate) const TOTAL: u32 = 1 << LOG_TOTAL;
 /// Tokens and the escape.
@@ -22,7 +22,7 @@ const MOVES: [f64; 7] = [0.0, -0.25, 0.25, 0.5, 0.7, 0.85, 0.95];
 /// Distributions of magnitudes: number = scale + 32 (shape + 4 move).
 pub(crate) const N_MAGNITUDE_TABLES: usize = N_SCALES * N_SHAPES * MOVES.len();
 /// Distributions of a flag.
-const N_FLAG_TABLES: usize = 60;
+const N_FLAG_TABLES: usize = 54;
 /// All distributions; the flags' come last.
 pub(crate) const N_TABLES: usize = N_MAGNITUDE_TABLES + N_FLAG_TABLES;
 
@@ -38,7 +38,7 @@ pub(crate) fn frequencies(number: usize) -> Frequencies {
 }
 
 /// Of a flag, the frequency of 1 is 1, 2, 3, 4, 5, 6, 7, 8, 10, 12, ...: each a quarter more than the one before, rounded down, but
-/// one more at least; the last 30 tables have the flags exchanged.
+/// one more at least; the last 27 tables have the flags exchanged.
 fn flag_frequencies(flag: usize) -> Frequencies {
     let rare = (0..flag % (N_FLAG_TABLES / 2)).fold(1u32, |f, _| f + (f / 4).max(1));
     let ones = if flag < N_FLAG_TABLES / 2 { rare } else { TOTAL - rare };
@@ -76,7 +76,7 @@ fn mass(token: u8, scale: f64, shape: u32) -> f64 {
     sum * n / 16.0 * if token == 0 { 1.0 } else { 2.0 }
 }
 
-/// Probabilities as frequencies: at least 1 for token 0 and for each token of 1/4096 and more, 0 for all others, which are escaped;
+/// Probabilities as frequencies: at least 1 for token 0 and for each token of 1/2048 and more, 0 for all others, which are escaped;
 /// what rounding leaves is given to, or taken from, the most frequent one.
 fn rounded(p: &[f64; N_TOKENS]) -> Frequencies {
     let total = f64::from(TOTAL);
@@ -156,7 +156,7 @@ mod tests {
     #[test]
     fn frequencies_are_those_of_version_1() {
         let all: Vec<u8> = (0..N_TABLES).flat_map(frequencies).flat_map(u16::to_le_bytes).collect();
-        assert_eq!(crc32c::crc32c(&all), 3_910_391_824);
+        assert_eq!(crc32c::crc32c(&all), 1_464_090_189);
     }
 
     #[test]

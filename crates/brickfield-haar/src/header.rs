@@ -160,6 +160,11 @@ impl BrickHeader {
         self.max_error
     }
 
+    /// The bytes of the header.
+    pub fn n_header_bytes(&self) -> usize {
+        self.n_bytes
+    }
+
     /// Whether coarser levels are stored apart, as bands; otherwise they are averages of all samples.
     pub(crate) fn has_bands(&self) -> bool {
         matches!(self.storage, Storage::Packed | Storage::Coded) && self.kernel.has_bands()

@@ -44,16 +44,58 @@ pub(crate) fn differences<C: Coefficient>(extent: UVec3, samples: &[C]) -> Vec<C
 }
 
 /// Turns differences into the samples that they were made of.
+///
+/// Rows of one diagonal, y + z, do not depend on each other: two at a time are undone, because a sample waits for the one before it.
 pub(crate) fn undo_differences<C: Coefficient>(extent: UVec3, array: &mut [C]) {
-    for_rows(extent, |row, of_y, of_z| {
-        let (before, after) = array.split_at_mut(row);
-        let own = &mut after[..extent.x as usize];
-        let rows = rows_before(before, own.len(), of_y, of_z);
-        predict_row(rows, own.len(), |x, prediction| {
-            own[x] = own[x].plus(prediction);
-            own[x]
-        });
+    let [nx, ny, nz] = extent.to_array().map(|n| n as usize);
+    let mut known = [Known::default(), Known::default()];
+    for diagonal in 0..ny + nz - 1 {
+        let zs = (diagonal + 1).saturating_sub(ny)..nz.min(diagonal + 1);
+        let row_of = |z: usize| nx * (diagonal - z + ny * z);
+        let (mut z, end) = (zs.start, zs.end);
+        while z < end {
+            let is_inner = |z: usize| z > 0 && z < diagonal;
+            if z + 1 < end && is_inner(z) && is_inner(z + 1) {
+                undo_rows(array, [row_of(z), row_of(z + 1)], [nx, nx * ny], &mut known);
+                z += 2;
+            } else {
+                undo_row(array, row_of(z), nx, (diagonal > z).then_some(nx), (z > 0).then_some(nx * ny));
+                z += 1;
+            }
+        }
+    }
+}
+
+fn undo_row<C: Coefficient>(array: &mut [C], row: usize, nx: usize, of_y: Option<usize>, of_z: Option<usize>) {
+    let (before, after) = array.split_at_mut(row);
+    let own = &mut after[..nx];
+    predict_row(rows_before(before, nx, of_y, of_z), nx, |x, prediction| {
+        own[x] = own[x].plus(prediction);
+        own[x]
     });
+}
+
+/// Undoes two rows, the first of which lies before the second, with all rows before them.
+fn undo_rows<C: Coefficient>(array: &mut [C], rows: [usize; 2], [nx, nxy]: [usize; 2], known: &mut [Known<C>; 2]) {
+    for row in rows {
+        let [n, u, nu] = [nx, nxy, nx + nxy].map(|distance| array[row - distance]);
+        array[row] = array[row].plus(median_of_3(n, u, n.plus(u).minus(nu)));
+    }
+    let [mut w, mut other_w] = rows.map(|row| array[row]);
+    for from in (1..nx).step_by(PIECE) {
+        let n_piece = PIECE.min(nx - from);
+        for (row, known) in rows.into_iter().zip(&mut *known) {
+            known.set([nx, nxy, nx + nxy].map(|distance| &array[row + from - 1 - distance..][..n_piece + 1]));
+        }
+        let [known, other_known] = &*known;
+        let (before, after) = array.split_at_mut(rows[1] + from);
+        let (own, other) = (&mut before[rows[0] + from..][..n_piece], &mut after[..n_piece]);
+        for (i, (own, other)) in own.iter_mut().zip(other).enumerate().take(PIECE) {
+            w = own.plus(known.prediction(i, w));
+            other_w = other.plus(other_known.prediction(i, other_w));
+            (*own, *other) = (w, other_w);
+        }
+    }
 }
 
 /// Calls `with` with the begin of each row, and the distances back to rows y - 1 and z - 1, if there are such rows.
@@ -93,12 +135,12 @@ fn predict_row<C: Coefficient>(before: Before<'_, C>, len: usize, mut sample: im
         }
         Before::All([n, u, nu]) => {
             let mut w = sample(0, median_of_3(n[0], u[0], n[0].plus(u[0]).minus(nu[0])));
+            let mut known = Known::default();
             for from in (1..len).step_by(PIECE) {
                 let n_piece = PIECE.min(len - from);
-                let rows = [n, u, nu].map(|row| &row[from - 1..][..n_piece + 1]);
-                let known = Known::of(rows);
-                for (i, (fixed, moving)) in known.fixed.iter().zip(&known.moving).take(n_piece).enumerate() {
-                    w = sample(from + i, median_of_7(*fixed, moving.map(|d| w.plus(d))));
+                known.set([n, u, nu].map(|row| &row[from - 1..][..n_piece + 1]));
+                for i in 0..n_piece {
+                    w = sample(from + i, known.prediction(i, w));
                 }
             }
         }
@@ -108,22 +150,36 @@ fn predict_row<C: Coefficient>(before: Before<'_, C>, len: usize, mut sample: im
 /// The seven predictions of a piece of a row, as far as they are known before the row: three, ascending, and four as differences
 /// from the sample before, ascending.
 struct Known<C> {
-    fixed: [[C; 3]; PIECE],
-    moving: [[C; 4]; PIECE],
+    fixed: [[C; PIECE]; 3],
+    moving: [[C; PIECE]; 4],
 }
 
 impl<C: Coefficient> Known<C> {
-    /// Rows begin one sample before the piece.
+    fn default() -> Known<C> {
+        Known { fixed: [[C::default(); PIECE]; 3], moving: [[C::default(); PIECE]; 4] }
+    }
+
+    /// Sets the predictions of a piece. Rows begin one sample before it.
     #[inline(always)]
-    fn of([n, u, nu]: [&[C]; 3]) -> Known<C> {
-        let mut known = Known { fixed: [[C::default(); 3]; PIECE], moving: [[C::default(); 4]; PIECE] };
-        let rows = n.windows(2).zip(u.windows(2)).zip(nu.windows(2));
-        for (((n, u), nu), (fixed, moving)) in rows.zip(known.fixed.iter_mut().zip(&mut known.moving)) {
-            let (of_n, of_u) = (n[1].minus(n[0]), u[1].minus(u[0]));
-            *fixed = sorted_3([n[1], u[1], n[1].plus(u[1]).minus(nu[1])]);
-            *moving = sorted_4([C::default(), of_n, of_u, of_n.plus(of_u).minus(nu[1].minus(nu[0]))]);
+    fn set(&mut self, [n, u, nu]: [&[C]; 3]) {
+        let len = n.len() - 1;
+        let [f1, f2, f3] = &mut self.fixed;
+        let [m1, m2, m3, m4] = &mut self.moving;
+        let (f1, f2, f3) = (&mut f1[..len], &mut f2[..len], &mut f3[..len]);
+        let (m1, m2, m3, m4) = (&mut m1[..len], &mut m2[..len], &mut m3[..len], &mut m4[..len]);
+        let (n, nw, u, uw, nu, nuw) = (&n[1..], &n[..len], &u[1..], &u[..len], &nu[1..], &nu[..len]);
+        for i in 0..len {
+            let (of_n, of_u) = (n[i].minus(nw[i]), u[i].minus(uw[i]));
+            [f1[i], f2[i], f3[i]] = sorted_3([n[i], u[i], n[i].plus(u[i]).minus(nu[i])]);
+            let of_all = of_n.plus(of_u).minus(nu[i].minus(nuw[i]));
+            [m1[i], m2[i], m3[i], m4[i]] = sorted_4([C::default(), of_n, of_u, of_all]);
         }
-        known
+    }
+
+    /// The prediction of sample `i` of the piece from the one before it.
+    #[inline(always)]
+    fn prediction(&self, i: usize, w: C) -> C {
+        median_of_7(std::array::from_fn(|k| self.fixed[k][i]), std::array::from_fn(|k| self.moving[k][i].plus(w)))
     }
 }
 

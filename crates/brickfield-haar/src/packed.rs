@@ -67,7 +67,10 @@ fn encode_section(numbers: &[u64]) -> Vec<u8> {
     for group in groups {
         let mut writer = BitWriter::default();
         let width = u32::from(width(group));
-        group.iter().for_each(|&number| writer.push(number, width));
+        for &number in group {
+            writer.push(low_bits(number, width.min(32)), width.min(32));
+            writer.push(number >> width.min(32), width.saturating_sub(32));
+        }
         bytes.extend(writer.into_bytes());
     }
     bytes

@@ -1,22 +1,24 @@
 //! Asymmetric numeral systems by tables (Duda 2013, tANS): symbols to bits by their frequencies.
 //!
-//! The state is a number below 2^11. To decode a symbol: look up the state; the entry has the symbol, and how many bits to read, which
+//! The state is a number below 2^10. To decode a symbol: look up the state; the entry has the symbol, and how many bits to read, which
 //! are added to the entry's base to make the next state. Encoding goes backwards, from the last symbol to the first.
 
 use std::sync::OnceLock;
 
-use crate::bits::low_bits;
 use crate::frequencies::{Frequencies, LOG_TOTAL, N_SYMBOLS, N_TABLES, TOTAL, frequencies};
 use crate::token::{ESCAPE, n_bits};
 
-/// What a state means: from the lowest bit on, the bits of the state (4), the bits that follow the token (5), token (6), base (11).
+/// What a state means. From the lowest bit on: how many bits of the state follow (4), how many of state and token together (6), the
+/// base of the next state (10), the token (6), whether it is the escape (1).
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Entry(u32);
 
 impl Entry {
     fn new(token: u8, n_state_bits: u32, base: u32) -> Entry {
-        let n_token_bits = if token == ESCAPE { 0 } else { n_bits(token) };
-        Entry(n_state_bits | n_token_bits << 4 | u32::from(token) << 9 | base << 15)
+        let is_escape = token == ESCAPE;
+        let n_token_bits = if is_escape { 0 } else { n_bits(token) };
+        let fields = n_state_bits | (n_state_bits + n_token_bits) << 4 | base << 10 | u32::from(token) << 20;
+        Entry(fields | u32::from(is_escape) << 26)
     }
 
     #[inline(always)]
@@ -24,22 +26,46 @@ impl Entry {
         self.0 & 15
     }
 
+    /// The bits of the state, and those of the token.
     #[inline(always)]
-    pub(crate) fn n_token_bits(self) -> u32 {
-        self.0 >> 4 & 31
+    pub(crate) fn n_all_bits(self) -> u32 {
+        self.0 >> 4 & 63
     }
 
     #[inline(always)]
     pub(crate) fn token(self) -> u8 {
-        (self.0 >> 9 & 63) as u8
+        (self.0 >> 20 & 63) as u8
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_escape(self) -> bool {
+        self.0 >> 26 == 1
     }
 
     /// The next state, from the bits that are read.
     #[inline(always)]
     pub(crate) fn next_state(self, window: u64) -> u16 {
-        ((self.0 >> 15) as u64 + low_bits(window, self.n_state_bits())) as u16
+        let bits = window as u32 & MASKS[self.n_state_bits() as usize];
+        ((self.0 >> 10 & (TOTAL - 1)) + bits) as u16
+    }
+
+    /// The bits that follow the token.
+    #[inline(always)]
+    pub(crate) fn token_bits(self, window: u64) -> u32 {
+        (window as u32 & MASKS[self.n_all_bits() as usize]) >> self.n_state_bits()
     }
 }
+
+/// The lower n bits of a word, for as many as an entry can state.
+static MASKS: [u32; 64] = {
+    let mut masks = [u32::MAX; 64];
+    let mut n = 0;
+    while n < 32 {
+        masks[n] = (1 << n) - 1;
+        n += 1;
+    }
+    masks
+};
 
 /// The entries of all states.
 pub(crate) type DecodeTable = [Entry; TOTAL as usize];
@@ -133,7 +159,7 @@ mod tests {
     /// Every state behind every symbol is reached again by decoding from the state before it.
     #[test]
     fn a_step_forward_undoes_a_step_back() {
-        for number in [0, 31, 100, 500, 895, 896, 955] {
+        for number in [0, 31, 100, 500, 895, 896, 949] {
             let (encode, decode) = (encode_table(number), decode_table(number));
             for symbol in (0..N_SYMBOLS as u8).filter(|&s| encode.frequencies[usize::from(s)] > 0) {
                 for state in 0..TOTAL as u16 {

@@ -25,6 +25,7 @@ pub(crate) fn token_of(magnitude: u64) -> u8 {
 }
 
 /// The least magnitude of a token.
+#[inline(always)]
 pub(crate) const fn first_magnitude(token: u8) -> u32 {
     match token {
         0..=7 => token as u32,
@@ -33,6 +34,7 @@ pub(crate) const fn first_magnitude(token: u8) -> u32 {
 }
 
 /// How many magnitudes a token stands for.
+#[inline(always)]
 pub(crate) const fn n_magnitudes(token: u8) -> u32 {
     match token {
         0..=7 => 1,
@@ -41,6 +43,7 @@ pub(crate) const fn n_magnitudes(token: u8) -> u32 {
 }
 
 /// How many bits follow a token: its sign, but for token 0, and the place of the magnitude among the token's.
+#[inline(always)]
 pub(crate) const fn n_bits(token: u8) -> u32 {
     match token {
         0 => 0,

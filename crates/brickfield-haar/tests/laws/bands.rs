@@ -35,7 +35,7 @@ fn averages(extent: UVec3, samples: &[i64]) -> Vec<i64> {
             for y in 0..half[1] {
                 for x in 0..half[0] {
                     let (mut a, mut b) = ([x, y, z], [x, y, z]);
-                    a[axis] = 2 * a[axis];
+                    a[axis] *= 2;
                     b[axis] = a[axis] + 1;
                     let a = value(a);
                     next.push(if b[axis] < n[axis] { (a + value(b)).div_euclid(2) } else { a });

@@ -2,7 +2,7 @@
 
 use brickfield_core::Scalar;
 use brickfield_core::glam::UVec3;
-use brickfield_haar::Sample;
+use brickfield_haar::{EncodeOptions, Kernel, Loss, Sample, Storages};
 use proptest::prelude::*;
 
 /// The least and the greatest sample of a type, as i64.
@@ -42,7 +42,7 @@ pub(crate) fn samples<T: Sample>(extent: UVec3) -> impl Strategy<Value = Vec<T>>
                 3 => smooth,
                 4 => smooth + (noise % 7) as i64,
                 _ => {
-                    if noise % 50 == 0 {
+                    if noise.is_multiple_of(50) {
                         (noise >> 8) as i64 % 300
                     } else {
                         5
@@ -57,6 +57,23 @@ pub(crate) fn samples<T: Sample>(extent: UVec3) -> impl Strategy<Value = Vec<T>>
 /// A brick: extent and samples.
 pub(crate) fn bricks<T: Sample>() -> impl Strategy<Value = (UVec3, Vec<T>)> {
     extents().prop_flat_map(|extent| (Just(extent), samples(extent)))
+}
+
+/// Any lossless options.
+pub(crate) fn options() -> impl Strategy<Value = EncodeOptions> {
+    let kernels = prop_oneof![
+        Just(Kernel::ALL.to_vec()),
+        Just(Kernel::AVERAGING.to_vec()),
+        prop::sample::select(Kernel::ALL.to_vec()).prop_map(|kernel| vec![kernel]),
+    ];
+    let storages = prop::sample::select(vec![Storages::Smallest, Storages::Packed]);
+    let n_levels = prop_oneof![Just(None), (0..=15u8).prop_map(Some)];
+    (kernels, storages, n_levels).prop_map(|(kernels, storages, n_levels)| EncodeOptions {
+        kernels,
+        storages,
+        n_levels,
+        loss: Loss::None,
+    })
 }
 
 /// SplitMix64.

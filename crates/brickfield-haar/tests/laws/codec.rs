@@ -3,30 +3,13 @@
 use brickfield_core::Level;
 use brickfield_core::glam::UVec3;
 use brickfield_haar::{
-    Bands, BrickHeader, Coefficient, EncodeError, EncodeOptions, Kernel, Loss, Sample, Storage, Storages, decode,
-    decode_level, encode,
+    Bands, BrickHeader, Coefficient, EncodeError, EncodeOptions, Kernel, Loss, Sample, Storage, decode, decode_level,
+    encode,
 };
 use proptest::prelude::*;
 
-use crate::bricks::{bricks, hold, name};
+use crate::bricks::{bricks, hold, name, options};
 use crate::for_all_types;
-
-/// Any lossless options.
-fn options() -> impl Strategy<Value = EncodeOptions> {
-    let kernels = prop_oneof![
-        Just(Kernel::ALL.to_vec()),
-        Just(Kernel::AVERAGING.to_vec()),
-        prop::sample::select(Kernel::ALL.to_vec()).prop_map(|kernel| vec![kernel]),
-    ];
-    let storages = prop::sample::select(vec![Storages::Smallest, Storages::Packed]);
-    let n_levels = prop_oneof![Just(None), (0..=15u8).prop_map(Some)];
-    (kernels, storages, n_levels).prop_map(|(kernels, storages, n_levels)| EncodeOptions {
-        kernels,
-        storages,
-        n_levels,
-        loss: Loss::None,
-    })
-}
 
 fn bricks_are_lossless<T: Sample>() {
     hold(300, (bricks::<T>(), options()), |((extent, samples), options)| {

@@ -3,3 +3,4 @@
 mod bands;
 mod bricks;
 mod codec;
+mod damage;
