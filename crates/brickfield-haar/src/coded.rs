@@ -166,46 +166,59 @@ fn n_following_bits(token: u8, magnitude: u64) -> usize {
     }
 }
 
+/// The bits of a symbol, up to 28 of them, and whether an escaped coefficient follows.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    bits: u32,
+    n_bits: u8,
+    is_escape: bool,
+}
+
 fn encode_section<C: Coefficient>(symbols: &[Symbol<C>], tables: &[&EncodeTable; N_CONTEXTS]) -> Vec<u8> {
     let mut states = [0u16; N_LANES + 1];
     let mut steps = Vec::with_capacity(symbols.len());
     for symbol in symbols.iter().rev() {
-        let table = tables[usize::from(symbol.context)];
-        let token = table.symbol(symbol.token);
         let state = &mut states[usize::from(symbol.lane)];
-        let (before, bits, n) = table.step_back(token, *state);
+        let (before, step) = step_back(symbol, tables[usize::from(symbol.context)], *state);
         *state = before;
-        steps.push((token, bits, n));
+        steps.push(step);
     }
     let mut writer = BitWriter::default();
     states.iter().for_each(|&state| writer.push(u64::from(state), LOG_TOTAL));
-    for (symbol, (token, bits, n)) in symbols.iter().zip(steps.into_iter().rev()) {
-        writer.push(u64::from(bits), n);
-        if symbol.lane != FLAG_LANE {
-            write_rest(&mut writer, token, symbol.value);
+    for (symbol, step) in symbols.iter().zip(steps.into_iter().rev()) {
+        writer.push(u64::from(step.bits), u32::from(step.n_bits));
+        if step.is_escape {
+            write_escaped(&mut writer, symbol.value);
         }
     }
     writer.into_bytes()
 }
 
-/// The bits that follow a token.
-#[inline]
-fn write_rest<C: Coefficient>(writer: &mut BitWriter, token: u8, value: C) {
-    let (magnitude, sign) = (value.magnitude(), u64::from(value < C::default()));
-    match token {
-        0 => {}
-        ESCAPE => write_escaped(writer, magnitude, sign),
-        _ => writer.push((magnitude - u64::from(first_magnitude(token))) << 1 | sign, n_bits(token)),
+#[inline(always)]
+fn step_back<C: Coefficient>(symbol: &Symbol<C>, table: &EncodeTable, state: u16) -> (u16, Step) {
+    let token = table.symbol(symbol.token);
+    let (before, bits, n) = table.step_back(token, state);
+    if token == ESCAPE {
+        return (before, Step { bits, n_bits: n as u8, is_escape: true });
     }
+    if symbol.lane == FLAG_LANE || token == 0 {
+        return (before, Step { bits, n_bits: n as u8, is_escape: false });
+    }
+    let place = symbol.value.magnitude() as u32 - first_magnitude(token);
+    let token_bits = place << 1 | u32::from(symbol.value < C::default());
+    (before, Step { bits: bits | token_bits << n, n_bits: (n + n_bits(token)) as u8, is_escape: false })
 }
 
 /// The number of the magnitude's bits in 6 bits, the sign, and the bits below the highest one, in two parts. The magnitude is from 1 to
 /// 2^63 - 1.
-fn write_escaped(writer: &mut BitWriter, magnitude: u64, sign: u64) {
+#[cold]
+#[inline(never)]
+fn write_escaped<C: Coefficient>(writer: &mut BitWriter, value: C) {
+    let magnitude = value.magnitude();
     let n_below = magnitude.ilog2();
     let below = low_bits(magnitude, n_below);
     writer.push(u64::from(n_below + 1), 6);
-    writer.push(sign, 1);
+    writer.push(u64::from(value < C::default()), 1);
     writer.push(low_bits(below, 32), n_below.min(32));
     writer.push(below >> 32, n_below.saturating_sub(32));
 }

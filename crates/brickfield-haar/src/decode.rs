@@ -5,7 +5,7 @@ use brickfield_core::{Level, ScalarType};
 
 use crate::coded::{self, BrokenSection};
 use crate::extent::{ExtentError, n_samples};
-use crate::header::{Body, BrickHeader, FORMAT_VERSION, N_CHECKSUM_BYTES};
+use crate::header::{Body, BrickHeader, FORMAT_VERSION, N_CHECKSUM_BYTES, matches_checksum};
 use crate::kernel::Kernel;
 use crate::packed;
 use crate::quantise::Quantiser;
@@ -109,7 +109,7 @@ fn sections<'a>(header: &BrickHeader, brick: &'a [u8], level: Level) -> Result<V
     for &n in &header.n_section_bytes[..header.n_sections_of_level(level)] {
         let (section, behind) = rest.split_at(n);
         let (checksum, behind) = behind.split_at(N_CHECKSUM_BYTES);
-        if checksum != crc32c::crc32c(section).to_le_bytes() {
+        if !matches_checksum(section, checksum) {
             return Err(DecodeError::Checksum { part: "a section" });
         }
         sections.push(section);
@@ -174,8 +174,12 @@ fn decode_section<C: crate::Coefficient>(
 fn restore<T: Sample>(header: &BrickHeader, values: Vec<T::Coefficient>, level: Level) -> Result<Vec<T>, DecodeError> {
     let is_lossless = header.max_error == 0 && header.step == 1;
     if is_lossless && (level == Level(0) || header.kernel != Kernel::LeGall53) {
-        let samples: Option<Vec<T>> = values.into_iter().map(T::narrow).collect();
-        return samples.ok_or(DecodeError::Range { scalar: T::TYPE });
+        // All are looked at, so that the loop has no exit.
+        let are_held = values.iter().fold(true, |all, &value| all & T::holds(value));
+        return match are_held {
+            true => Ok(values.iter().map(|&value| T::truncate(value)).collect()),
+            false => Err(DecodeError::Range { scalar: T::TYPE }),
+        };
     }
     let quantiser = Quantiser::with_step(header.step);
     Ok(values.into_iter().map(|value| quantiser.restore_nearest(value)).collect())

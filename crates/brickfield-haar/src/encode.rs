@@ -48,9 +48,14 @@ pub enum Loss {
 }
 
 impl Default for EncodeOptions {
-    /// All kernels, the smallest storage, lossless.
+    /// The kernels that make one pyramid, the smallest storage, lossless.
     fn default() -> EncodeOptions {
-        EncodeOptions { kernels: Kernel::ALL.to_vec(), storages: Storages::Smallest, n_levels: None, loss: Loss::None }
+        EncodeOptions {
+            kernels: Kernel::AVERAGING.to_vec(),
+            storages: Storages::Smallest,
+            n_levels: None,
+            loss: Loss::None,
+        }
     }
 }
 

@@ -24,9 +24,33 @@ pub(crate) fn encode<C: Coefficient>(bands: &Bands<C>) -> Vec<Vec<u8>> {
 
 /// The number of bytes that [`encode`] will make.
 pub(crate) fn n_bytes<C: Coefficient>(bands: &Bands<C>) -> usize {
-    let of_group = |group: &[u64]| 1 + (usize::from(width(group)) * group.len()).div_ceil(8);
-    let of_section = |numbers: Vec<u64>| numbers.chunks(N_IN_GROUP).map(of_group).sum::<usize>();
-    boxes_of(bands).map(|(array, all, boxes)| of_section(numbers(array, all, &boxes))).sum()
+    boxes_of(bands).map(|(array, all, boxes)| n_section_bytes(array, all, &boxes)).sum()
+}
+
+fn n_section_bytes<C: Coefficient>(array: &[C], all: UVec3, boxes: &[BandBox]) -> usize {
+    let mut n_bytes = 0;
+    let (mut union, mut n_in_group) = (0, 0);
+    for band in boxes {
+        for (z, y) in rows(band) {
+            let mut row = &array[band.row(all, y, z)..][..band.n.x as usize];
+            while !row.is_empty() {
+                let (own, rest) = row.split_at(row.len().min(N_IN_GROUP - n_in_group));
+                union = own.iter().fold(union, |union, c| union | zigzag(c.to_i64()));
+                n_in_group += own.len();
+                if n_in_group == N_IN_GROUP {
+                    n_bytes += n_group_bytes(union, n_in_group);
+                    (union, n_in_group) = (0, 0);
+                }
+                row = rest;
+            }
+        }
+    }
+    if n_in_group == 0 { n_bytes } else { n_bytes + n_group_bytes(union, n_in_group) }
+}
+
+/// The bytes of a group, its width among them.
+fn n_group_bytes(union: u64, n: usize) -> usize {
+    1 + ((u64::BITS - union.leading_zeros()) as usize * n).div_ceil(8)
 }
 
 /// For each section its array, the array's extent and the boxes in it.

@@ -10,8 +10,10 @@ pub trait Sample: Scalar + Eq + std::fmt::Debug + sealed::Sample {
     type Coefficient: Coefficient;
     /// The sample as a coefficient; exact.
     fn widen(self) -> Self::Coefficient;
-    /// A coefficient as a sample, or `None` if it is outside of this type's range.
-    fn narrow(coefficient: Self::Coefficient) -> Option<Self>;
+    /// Whether a coefficient is in this type's range.
+    fn holds(coefficient: Self::Coefficient) -> bool;
+    /// A coefficient as a sample, modulo this type's range.
+    fn truncate(coefficient: Self::Coefficient) -> Self;
     /// The sample as i64; exact.
     fn to_i64(self) -> i64;
     /// The nearest sample.
@@ -74,7 +76,9 @@ macro_rules! samples {
             #[inline(always)]
             fn widen(self) -> $c { $c::from(self) }
             #[inline(always)]
-            fn narrow(coefficient: $c) -> Option<Self> { Self::try_from(coefficient).ok() }
+            fn holds(coefficient: $c) -> bool { coefficient >= $c::from($t::MIN) && coefficient <= $c::from($t::MAX) }
+            #[inline(always)]
+            fn truncate(coefficient: $c) -> Self { coefficient as $t }
             #[inline(always)]
             fn to_i64(self) -> i64 { i64::from(self) }
             #[inline(always)]

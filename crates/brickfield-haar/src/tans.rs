@@ -73,11 +73,20 @@ pub(crate) type DecodeTable = [Entry; TOTAL as usize];
 /// From symbols to states.
 #[derive(Debug)]
 pub(crate) struct EncodeTable {
-    frequencies: Frequencies,
-    /// Where the states of each symbol begin in `states`.
-    first: [u16; N_SYMBOLS],
+    codes: [SymbolCode; N_SYMBOLS],
     /// The states of all symbols, each symbol's in ascending order.
-    states: Vec<u16>,
+    states: [u16; TOTAL as usize],
+}
+
+/// How a symbol is coded. Of a state behind it, plus [`TOTAL`], all but the lower n bits number the symbol's states.
+#[derive(Clone, Copy, Debug)]
+struct SymbolCode {
+    /// 0 means that the symbol is escaped.
+    frequency: u16,
+    /// n in 16.16, less the least state with n bits: see [`EncodeTable::step_back`].
+    n_bits: u32,
+    /// Where the symbol's states begin, less its frequency.
+    first: i32,
 }
 
 /// The decoding table of a number below [`N_TABLES`].
@@ -122,33 +131,40 @@ fn new_encode_table(frequencies: &Frequencies) -> EncodeTable {
     for symbol in 1..N_SYMBOLS {
         first[symbol] = first[symbol - 1] + frequencies[symbol - 1];
     }
+    let codes = std::array::from_fn(|symbol| SymbolCode::new(frequencies[symbol], first[symbol]));
     let mut next = first;
-    let mut states = vec![0; TOTAL as usize];
+    let mut states = [0; TOTAL as usize];
     for (state, symbol) in spread(frequencies).into_iter().enumerate() {
         states[usize::from(next[usize::from(symbol)])] = state as u16;
         next[usize::from(symbol)] += 1;
     }
-    EncodeTable { frequencies: *frequencies, first, states }
+    EncodeTable { codes, states }
+}
+
+impl SymbolCode {
+    fn new(frequency: u16, first: u16) -> SymbolCode {
+        // With n bits a state is shifted to frequency .. 2 frequency, with n - 1 bits if it would be less.
+        let n = LOG_TOTAL - u32::from(frequency.max(1)).ilog2();
+        let least = u32::from(frequency) << n;
+        SymbolCode { frequency, n_bits: (n << 16) - least, first: i32::from(first) - i32::from(frequency) }
+    }
 }
 
 impl EncodeTable {
     /// The symbol that stands for a token: itself or the escape.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn symbol(&self, token: u8) -> u8 {
-        if self.frequencies[usize::from(token)] == 0 { ESCAPE } else { token }
+        if self.codes[usize::from(token)].frequency == 0 { ESCAPE } else { token }
     }
 
     /// The state before a symbol, from the state behind it; and the bits that lead from one to the other, with their number.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn step_back(&self, symbol: u8, state: u16) -> (u16, u32, u32) {
-        let symbol = usize::from(symbol);
-        let frequency = u32::from(self.frequencies[symbol]);
+        let code = &self.codes[usize::from(symbol)];
         let x = u32::from(state) + TOTAL;
-        // The number of bits with which x >> n lies in frequency .. 2 frequency.
-        let n = LOG_TOTAL - frequency.ilog2();
-        let n = if x >> n < frequency { n - 1 } else { n };
-        let index = u32::from(self.first[symbol]) + (x >> n) - frequency;
-        (self.states[index as usize], x & ((1 << n) - 1), n)
+        let n = (x + code.n_bits) >> 16;
+        let place = (x >> n) as i32 + code.first;
+        (self.states[place as usize], x & ((1 << n) - 1), n)
     }
 }
 
@@ -161,7 +177,7 @@ mod tests {
     fn a_step_forward_undoes_a_step_back() {
         for number in [0, 31, 100, 500, 895, 896, 949] {
             let (encode, decode) = (encode_table(number), decode_table(number));
-            for symbol in (0..N_SYMBOLS as u8).filter(|&s| encode.frequencies[usize::from(s)] > 0) {
+            for symbol in (0..N_SYMBOLS as u8).filter(|&s| encode.codes[usize::from(s)].frequency > 0) {
                 for state in 0..TOTAL as u16 {
                     let (before, bits, n) = encode.step_back(symbol, state);
                     let entry = decode[usize::from(before)];

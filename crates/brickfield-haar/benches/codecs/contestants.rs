@@ -18,8 +18,8 @@ type Decode<T> = dyn Fn(&[u8]) -> Vec<T> + Sync;
 pub(crate) fn contestants<T: Stored>() -> Vec<Contestant<T>> {
     let default = EncodeOptions::default;
     let mut contestants = vec![
-        ours("the smallest of all kernels", default()),
-        ours("of averaging kernels", EncodeOptions { kernels: Kernel::AVERAGING.to_vec(), ..default() }),
+        ours("the smallest of all kernels", EncodeOptions { kernels: Kernel::ALL.to_vec(), ..default() }),
+        ours("of averaging kernels, the default", default()),
     ];
     for kernel in Kernel::ALL {
         contestants.push(ours(kernel.name(), EncodeOptions { kernels: vec![kernel], ..default() }));
@@ -30,7 +30,7 @@ pub(crate) fn contestants<T: Stored>() -> Vec<Contestant<T>> {
     }
     for most in [1, 4] {
         let options = EncodeOptions { loss: Loss::MaxError(most), ..default() };
-        contestants.push(ours(&format!("all kernels, error of at most {most}"), options));
+        contestants.push(ours(&format!("default, error of at most {most}"), options));
     }
     contestants.extend([zstd(3), zstd(19), pco()]);
     contestants

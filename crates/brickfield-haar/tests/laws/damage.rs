@@ -149,3 +149,31 @@ fn storages_are_chosen_by_content() {
     let mostly_small: Vec<u8> = noise(8).into_iter().map(|n| n.leading_zeros() as u8).collect();
     assert_eq!(storage(&mostly_small, Storages::Smallest), Storage::Coded);
 }
+
+/// Bricks to begin fuzzing with; written only where `BRICKFIELD_FUZZ_SEEDS` names a folder.
+#[test]
+fn seeds_are_bricks() {
+    let folder =
+        std::env::var_os("BRICKFIELD_FUZZ_SEEDS").map(|folder| std::path::PathBuf::from(folder).join("decode"));
+    if let Some(folder) = &folder {
+        std::fs::create_dir_all(folder).expect("a folder that can be written");
+    }
+    for (i, kernel) in Kernel::ALL.into_iter().enumerate() {
+        for storages in [Storages::Smallest, Storages::Packed] {
+            let options = EncodeOptions { kernels: vec![kernel], storages, ..EncodeOptions::default() };
+            let bricks = [seed::<u8>(&options), seed::<i16>(&options), seed::<u32>(&options)];
+            for (j, brick) in bricks.into_iter().enumerate() {
+                assert!(BrickHeader::read(&brick).is_ok());
+                if let Some(folder) = &folder {
+                    std::fs::write(folder.join(format!("{i}-{storages:?}-{j}")), brick)
+                        .expect("a file that can be written");
+                }
+            }
+        }
+    }
+}
+
+fn seed<T: Sample>(options: &EncodeOptions) -> Vec<u8> {
+    let samples: Vec<T> = (0..9 * 8 * 7).map(|i: i64| T::saturate(i * i / 100 % 90 + i % 9 / 8 * 70_000)).collect();
+    encode(UVec3::new(9, 8, 7), &samples, options).expect("a brick")
+}
