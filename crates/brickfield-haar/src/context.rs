@@ -155,28 +155,47 @@ mod tests {
         }
     }
 
-    /// A box of 2 x 2 x 2 with magnitudes 1 in the first slice: all weights are there, whatever neighbours are missing.
+    /// Where neighbours do not exist, others stand in for them: equal magnitudes make equal sums, or nearly in the first row of a slice.
     #[test]
-    fn equal_magnitudes_make_equal_sums() {
-        let mut neighbours = Neighbours::new(2, 2);
-        let mut classes = [0; 2];
+    fn others_stand_in_for_neighbours() {
+        let mut neighbours = Neighbours::new(3, 2);
+        let mut classes = [0; 3];
         neighbours.classes(&mut classes);
-        assert_eq!((classes, neighbours.flag_context()), ([15; 2], N_CLASSES));
-        for _ in 0..2 {
-            neighbours.pass_row([1, 1].into_iter());
+        assert_eq!(classes, [15; 3], "nothing is known before the first row");
+        for expected in [40, 36, 40, 36] {
+            neighbours.pass_row([4; 3].into_iter());
             neighbours.classes(&mut classes);
-            assert_eq!(classes, [CLASS_OF_SUM[10]; 2]);
+            assert_eq!(neighbours.sums, [expected; 3]);
         }
-        let sums = [(false, [10; 2]), (true, [9; 2])];
-        for (zero_above, expected) in sums {
-            if zero_above {
-                neighbours.pass_zero();
-                neighbours.classes(&mut classes);
-                assert_eq!(neighbours.flag_context(), N_CLASSES + 1);
-                assert_eq!(neighbours.sums, [6; 2]);
-            } else {
-                assert_eq!(neighbours.sums, expected.map(|sum: u16| sum - 1));
+    }
+
+    /// The weights of the drawing, by one magnitude of 1 at a time.
+    #[test]
+    fn magnitudes_have_their_weights() {
+        let sum_at_middle = |place: usize| {
+            let mut neighbours = Neighbours::new(3, 3);
+            // Rows of slice z - 1, then the row before in slice z.
+            for row in 0..4 {
+                neighbours.pass_row((0..3).map(|x| u16::from(3 * row + x == place)));
+            }
+            neighbours.classes(&mut [0; 3]);
+            neighbours.sums[1]
+        };
+        let weights: Vec<u16> = (0..12).map(sum_at_middle).collect();
+        assert_eq!(weights, [0, 1, 0, 1, 2, 1, 0, 1, 0, 1, 2, 1]);
+    }
+
+    #[test]
+    fn flags_count_the_zero_rows_before() {
+        let mut neighbours = Neighbours::new(2, 2);
+        let mut contexts = Vec::new();
+        for is_zero in [true, true, false, true, true] {
+            contexts.push(neighbours.flag_context() - N_CLASSES);
+            match is_zero {
+                true => neighbours.pass_zero(),
+                false => neighbours.pass_row([1; 2].into_iter()),
             }
         }
+        assert_eq!(contexts, [0, 1, 1, 1, 0]);
     }
 }

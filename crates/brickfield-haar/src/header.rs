@@ -92,8 +92,13 @@ impl BrickHeader {
             }
             Storage::Raw => self.n_section_bytes = vec![n * self.scalar.n_bytes()],
             Storage::Packed | Storage::Coded => {
-                let length = |_| Ok(fields.number("the bytes of a section", u64::from(u32::MAX))? as usize);
-                self.n_section_bytes = (0..=self.n_levels).map(length).collect::<Result<_, DecodeError>>()?;
+                // Longer sections would have been stored raw.
+                let mut most = (n * self.scalar.n_bytes()) as u64;
+                for _ in 0..=self.n_levels {
+                    let n_bytes = fields.number("the bytes of a section", most)?;
+                    most -= n_bytes;
+                    self.n_section_bytes.push(n_bytes as usize);
+                }
                 self.body = Body::Packed;
             }
         }

@@ -3,8 +3,8 @@
 use brickfield_core::Level;
 use brickfield_core::glam::UVec3;
 use brickfield_haar::{
-    Bands, BrickHeader, Coefficient, EncodeError, EncodeOptions, Kernel, Loss, Sample, Storage, decode, decode_level,
-    encode,
+    Bands, BrickHeader, Coefficient, EncodeError, EncodeOptions, Kernel, Loss, Sample, Storage, decode, decode_bricks,
+    decode_level, encode, encode_bricks,
 };
 use proptest::prelude::*;
 
@@ -130,4 +130,21 @@ fn options_out_of_bounds_are_named() {
     assert_eq!(threshold, EncodeError::NoDetails { threshold: 9 });
     let samples = encode(UVec3::ONE, &[1u8; 2], &default()).unwrap_err();
     assert_eq!(samples.to_string(), "a brick of [1, 1, 1] has 1 samples, but 2 are given");
+}
+
+#[test]
+fn bricks_of_all_threads_are_those_of_one() {
+    hold(20, prop::collection::vec(bricks::<u8>(), 0..6), |bricks| {
+        let options = EncodeOptions::default();
+        let encoded = encode_bricks(&bricks, &options).expect("options within bounds");
+        let decoded = decode_bricks::<u8>(&encoded).expect("bricks");
+        for ((extent, samples), (encoded, decoded)) in bricks.iter().zip(encoded.iter().zip(decoded)) {
+            prop_assert!(*encoded == encode(*extent, samples, &options).expect("options within bounds"));
+            prop_assert!(decoded.extent == *extent && decoded.samples == *samples);
+        }
+        Ok(())
+    });
+    let error = encode_bricks(&[(UVec3::ONE, vec![1u8]), (UVec3::ZERO, vec![])], &EncodeOptions::default());
+    assert!(matches!(error, Err(EncodeError::Extent(_))));
+    assert!(decode_bricks::<u8>(&[b"no brick"]).is_err());
 }

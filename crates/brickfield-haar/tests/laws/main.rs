@@ -4,3 +4,4 @@ mod bands;
 mod bricks;
 mod codec;
 mod damage;
+mod format;
