@@ -2,13 +2,14 @@
 //!
 //! A section is a string of bits: the first states of nine lanes, 10 bits each, then rows in ascending order. A row begins with its
 //! flag, in lane 8: 1 if all is 0. Otherwise coefficient x follows in lane x modulo 8: the bits of its state, then those of its token.
-//! After the last row all states are 0.
+//! After the last row all states are 0. A section without coefficients has no bits.
 
 use brickfield_core::Level;
 use brickfield_core::glam::UVec3;
 
 use crate::bits::{BitReader, BitWriter, low_bits};
 use crate::context::{N_CLASSES, N_CONTEXTS, Neighbours};
+use crate::encode::LowBand;
 use crate::extent::BandBox;
 use crate::frequencies::{
     LOG_TOTAL, N_MAGNITUDE_TABLES, N_SYMBOLS, N_TABLES, TOTAL, best_flag_table, best_magnitude_table,
@@ -77,11 +78,16 @@ pub(crate) struct Symbols<C> {
 
 impl<C: Coefficient> Symbols<C> {
     /// The low band as differences of the median kernel, then the details of each level.
-    pub(crate) fn of(bands: &Bands<C>) -> Symbols<C> {
+    pub(crate) fn of(bands: &Bands<C>, low_band: LowBand) -> Symbols<C> {
         let mut counts = Counts { of_tokens: [[0; N_SYMBOLS]; N_CONTEXTS], n_bits: 0 };
         let n = bands.extent(Level(bands.n_levels()));
-        let low = differences(n, bands.low());
-        let mut sections = vec![section(&low, n, std::iter::once(BandBox::whole(n)), &mut counts)];
+        let mut sections = vec![match low_band {
+            LowBand::Stored => {
+                let low = differences(n, bands.low());
+                section(&low, n, std::iter::once(BandBox::whole(n)), &mut counts)
+            }
+            LowBand::Elsewhere => Vec::new(),
+        }];
         for level in (0..bands.n_levels()).rev() {
             let n = bands.extent(Level(level));
             sections.push(section(bands.details(Level(level)), n, BandBox::details(n), &mut counts));
@@ -175,6 +181,9 @@ struct Step {
 }
 
 fn encode_section<C: Coefficient>(symbols: &[Symbol<C>], tables: &[&EncodeTable; N_CONTEXTS]) -> Vec<u8> {
+    if symbols.is_empty() {
+        return Vec::new();
+    }
     let mut states = [0u16; N_LANES + 1];
     let mut steps = Vec::with_capacity(symbols.len());
     for symbol in symbols.iter().rev() {
@@ -271,6 +280,10 @@ fn decode_section<C: Coefficient>(
     bytes: &[u8],
     model: &Model,
 ) -> Result<(), BrokenSection> {
+    let mut boxes = boxes.peekable();
+    if boxes.peek().is_none() {
+        return if bytes.is_empty() { Ok(()) } else { Err(BrokenSection) };
+    }
     let tables = model.decode_tables();
     let mut decoder = Decoder::new(bytes, &tables);
     let mut classes = vec![0; all.x as usize];

@@ -4,6 +4,7 @@ use brickfield_core::glam::UVec3;
 use brickfield_core::{Level, ScalarType};
 
 use crate::coded::{self, BrokenSection};
+use crate::encode::LowBand;
 use crate::extent::{ExtentError, n_samples};
 use crate::header::{Body, BrickHeader, FORMAT_VERSION, N_CHECKSUM_BYTES, matches_checksum};
 use crate::kernel::Kernel;
@@ -45,6 +46,10 @@ pub enum DecodeError {
     Section { section: usize },
     #[error("level {level} of a brick; it has levels 0 to {coarsest}")]
     Level { level: u8, coarsest: u8 },
+    #[error("the low band of the brick is stored elsewhere, and is not given")]
+    LowBandElsewhere,
+    #[error("the low band of the brick has {expected} samples, but {given} are given")]
+    LowBand { expected: usize, given: usize },
     #[error("a decoded sample is outside of the range of {scalar}: the brick is damaged")]
     Range { scalar: ScalarType },
 }
@@ -57,12 +62,25 @@ pub enum DecodeError {
 /// # Errors
 /// If the bytes are no brick, are damaged, or have samples of another type.
 pub fn decode<T: Sample>(brick: &[u8]) -> Result<Decoded<T>, DecodeError> {
+    level_of(&whole_brick(brick)?, brick, Level(0), None)
+}
+
+/// Decodes all samples of a brick with [`LowBand::Elsewhere`], given its low band: level [`BrickHeader::n_levels`], x fastest. A brick
+/// that needs none, such as one of one value, leaves it out of account.
+///
+/// # Errors
+/// As for [`decode`], and if the low band has another number of samples.
+pub fn decode_with_low<T: Sample>(brick: &[u8], low: &[T]) -> Result<Decoded<T>, DecodeError> {
+    level_of(&whole_brick(brick)?, brick, Level(0), Some(low))
+}
+
+/// The header of a brick that ends with its last section.
+fn whole_brick(brick: &[u8]) -> Result<BrickHeader, DecodeError> {
     let header = BrickHeader::read(brick)?;
-    let n_bytes = header.n_bytes_of_level(Level(0));
-    if brick.len() > n_bytes {
-        return Err(DecodeError::TooLong { extra: brick.len() - n_bytes });
+    match brick.len().checked_sub(header.n_bytes_of_level(Level(0))) {
+        Some(extra) if extra > 0 => Err(DecodeError::TooLong { extra }),
+        _ => Ok(header),
     }
-    level_of(&header, brick, Level(0))
 }
 
 /// Decodes the samples of a level: ceil(extent / 2^level) of them. Bytes behind [`BrickHeader::n_bytes_of_level`] are not read, and may
@@ -74,10 +92,15 @@ pub fn decode<T: Sample>(brick: &[u8]) -> Result<Decoded<T>, DecodeError> {
 /// # Errors
 /// As for [`decode`], and if the brick does not have the level.
 pub fn decode_level<T: Sample>(brick: &[u8], level: Level) -> Result<Decoded<T>, DecodeError> {
-    level_of(&BrickHeader::read(brick)?, brick, level)
+    level_of(&BrickHeader::read(brick)?, brick, level, None)
 }
 
-fn level_of<T: Sample>(header: &BrickHeader, brick: &[u8], level: Level) -> Result<Decoded<T>, DecodeError> {
+fn level_of<T: Sample>(
+    header: &BrickHeader,
+    brick: &[u8],
+    level: Level,
+    low: Option<&[T]>,
+) -> Result<Decoded<T>, DecodeError> {
     if header.scalar != T::TYPE {
         return Err(DecodeError::Type { found: header.scalar, wanted: T::TYPE });
     }
@@ -92,7 +115,7 @@ fn level_of<T: Sample>(header: &BrickHeader, brick: &[u8], level: Level) -> Resu
     let samples = match header.body {
         Body::Value(value) => vec![in_range::<T>(value)?; n_samples(extent)?],
         Body::Raw => raw_level(header, sections(header, brick, level)?[0], level),
-        Body::Packed | Body::Coded(_) => band_level(header, &sections(header, brick, level)?, level)?,
+        Body::Packed | Body::Coded(_) => band_level(header, &sections(header, brick, level)?, level, low)?,
     };
     Ok(Decoded { extent, samples })
 }
@@ -139,9 +162,18 @@ fn averages<C: crate::Coefficient>(extent: UVec3, values: Vec<C>, level: Level) 
     bands.into_level(level)
 }
 
-fn band_level<T: Sample>(header: &BrickHeader, sections: &[&[u8]], level: Level) -> Result<Vec<T>, DecodeError> {
+fn band_level<T: Sample>(
+    header: &BrickHeader,
+    sections: &[&[u8]],
+    level: Level,
+    low: Option<&[T]>,
+) -> Result<Vec<T>, DecodeError> {
     let mut bands = Bands::zero(header.kernel, header.extent, header.n_levels, level);
-    for (i, section) in sections.iter().enumerate() {
+    let is_elsewhere = header.low_band() == LowBand::Elsewhere;
+    if is_elsewhere {
+        fill_low(&mut bands, low.ok_or(DecodeError::LowBandElsewhere)?)?;
+    }
+    for (i, section) in sections.iter().enumerate().skip(usize::from(is_elsewhere)) {
         let of_level = header.n_levels.checked_sub(i as u8);
         decode_section(&mut bands, header.body, of_level, section).map_err(|_| DecodeError::Section { section: i })?;
     }
@@ -150,6 +182,15 @@ fn band_level<T: Sample>(header: &BrickHeader, sections: &[&[u8]], level: Level)
         false => averages(header.extent, bands.into_level(Level(0)), level),
     };
     restore(header, values, level)
+}
+
+fn fill_low<T: Sample>(bands: &mut Bands<T::Coefficient>, low: &[T]) -> Result<(), DecodeError> {
+    let own = bands.low_mut();
+    if own.len() != low.len() {
+        return Err(DecodeError::LowBand { expected: own.len(), given: low.len() });
+    }
+    own.iter_mut().zip(low).for_each(|(own, sample)| *own = sample.widen());
+    Ok(())
 }
 
 /// Section 0 has the low band, section i > 0 the details of level n_levels - i.

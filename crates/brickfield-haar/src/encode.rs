@@ -23,6 +23,17 @@ pub struct EncodeOptions {
     pub n_levels: Option<u8>,
     /// What may be lost.
     pub loss: Loss,
+    /// Whether the low band is a part of the brick.
+    pub low_band: LowBand,
+}
+
+/// Where the low band is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LowBand {
+    /// In the brick.
+    Stored,
+    /// Not in the brick: it is the next level, which is stored elsewhere, and [`decode_with_low`](crate::decode_with_low) is given it.
+    Elsewhere,
 }
 
 /// The storages that may be used. Whatever is chosen, a brick of one value is [`Storage::OneValue`], and one that would be longer than
@@ -55,6 +66,7 @@ impl Default for EncodeOptions {
             storages: Storages::Smallest,
             n_levels: None,
             loss: Loss::None,
+            low_band: LowBand::Stored,
         }
     }
 }
@@ -76,6 +88,14 @@ pub enum EncodeError {
     MaxError { given: u32 },
     #[error("the kernel median has no details that a threshold of {threshold} could set to 0")]
     NoDetails { threshold: u32 },
+    #[error(
+        "the low band of the kernel {kernel} cannot be stored elsewhere; only those of haar and haar-predicted can"
+    )]
+    NoLowBand { kernel: Kernel },
+    #[error("a brick of 0 levels has no low band that could be stored elsewhere; at least 1 is needed")]
+    NoLevels,
+    #[error("a low band can be stored elsewhere only if nothing is lost, but {loss:?} is asked for")]
+    LossyLowBand { loss: Loss },
 }
 
 /// Encodes a brick of samples, of which x varies fastest.
@@ -93,7 +113,7 @@ pub fn encode<T: Sample>(extent: UVec3, samples: &[T], options: &EncodeOptions) 
         return Ok(of_one_value(extent, samples, value));
     }
     let best = best_candidate(extent, &quantiser.quantise(samples), n_levels, options);
-    let brick = of_bands(samples, best, quantiser, options.loss);
+    let brick = of_bands(samples, best, quantiser, options);
     let is_longer_than_samples = brick.len() > samples.len() * T::TYPE.n_bytes();
     Ok(if is_longer_than_samples { of_raw(extent, samples) } else { brick })
 }
@@ -110,6 +130,25 @@ fn check(options: &EncodeOptions, extent: UVec3) -> Result<u8, EncodeError> {
         }
         _ => {}
     }
+    let n_levels = n_levels(options, extent)?;
+    if options.low_band == LowBand::Elsewhere {
+        check_low_band(options, n_levels)?;
+    }
+    Ok(n_levels)
+}
+
+/// Whether the low band is samples of the next level.
+fn check_low_band(options: &EncodeOptions, n_levels: u8) -> Result<(), EncodeError> {
+    let is_other = |kernel: &&Kernel| !matches!(kernel, Kernel::Haar | Kernel::HaarPredicted);
+    match options.kernels.iter().find(is_other) {
+        Some(&kernel) => Err(EncodeError::NoLowBand { kernel }),
+        None if n_levels == 0 => Err(EncodeError::NoLevels),
+        None if options.loss != Loss::None => Err(EncodeError::LossyLowBand { loss: options.loss }),
+        None => Ok(()),
+    }
+}
+
+fn n_levels(options: &EncodeOptions, extent: UVec3) -> Result<u8, EncodeError> {
     match options.n_levels {
         Some(given) if given > MAX_LEVELS => Err(EncodeError::Levels { given }),
         Some(n_levels) => Ok(n_levels),
@@ -141,11 +180,11 @@ fn best_candidate<C: crate::Coefficient>(
         if let Loss::Threshold(bound) = options.loss {
             bands.threshold(u64::from(bound));
         }
-        let packed = packed::n_bytes(&bands);
+        let packed = packed::n_bytes(&bands, options.low_band);
         if options.storages == Storages::Packed {
             return Candidate { bands, form: Form::Packed, n_bytes: packed };
         }
-        let symbols = Symbols::of(&bands);
+        let symbols = Symbols::of(&bands, options.low_band);
         let coded = symbols.estimated_bytes();
         match packed <= coded + coded / 32 {
             true => Candidate { bands, form: Form::Packed, n_bytes: packed },
@@ -185,9 +224,14 @@ fn of_raw<T: Sample>(extent: UVec3, samples: &[T]) -> Vec<u8> {
     bytes
 }
 
-fn of_bands<T: Sample>(samples: &[T], best: Candidate<T::Coefficient>, quantiser: Quantiser, loss: Loss) -> Vec<u8> {
+fn of_bands<T: Sample>(
+    samples: &[T],
+    best: Candidate<T::Coefficient>,
+    quantiser: Quantiser,
+    &EncodeOptions { loss, low_band, .. }: &EncodeOptions,
+) -> Vec<u8> {
     let (body, sections) = match &best.form {
-        Form::Packed => (Body::Packed, packed::encode(&best.bands)),
+        Form::Packed => (Body::Packed, packed::encode(&best.bands, low_band)),
         Form::Coded(symbols) => {
             let (model, sections) = symbols.encode();
             (Body::Coded(model), sections)

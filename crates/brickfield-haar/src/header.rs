@@ -5,6 +5,7 @@ use brickfield_core::{Level, ScalarType};
 
 use crate::coded::{Model, N_MODEL_BYTES};
 use crate::decode::DecodeError;
+use crate::encode::LowBand;
 use crate::extent::{MAX_LEVELS, n_samples};
 use crate::kernel::Kernel;
 use crate::packed::{unzigzag, zigzag};
@@ -185,6 +186,12 @@ impl BrickHeader {
     pub fn n_bytes_of_level(&self, level: Level) -> usize {
         let sections = &self.n_section_bytes[..self.n_sections_of_level(level)];
         self.n_bytes + sections.iter().map(|n| n + N_CHECKSUM_BYTES).sum::<usize>()
+    }
+
+    /// Where the low band is; [`LowBand::Stored`] if there is none.
+    pub fn low_band(&self) -> LowBand {
+        let is_empty = self.has_bands() && self.n_levels > 0 && self.n_section_bytes[0] == 0;
+        if is_empty { LowBand::Elsewhere } else { LowBand::Stored }
     }
 
     /// The sections that a level needs.

@@ -18,8 +18,8 @@ mod tans;
 mod token;
 mod transform;
 
-pub use decode::{DecodeError, Decoded, decode, decode_level};
-pub use encode::{EncodeError, EncodeOptions, Loss, Storages, encode};
+pub use decode::{DecodeError, Decoded, decode, decode_level, decode_with_low};
+pub use encode::{EncodeError, EncodeOptions, Loss, LowBand, Storages, encode};
 pub use extent::{ExtentError, MAX_LEVELS, MAX_SAMPLES};
 pub use header::{BrickHeader, FORMAT_VERSION, Storage};
 pub use kernel::Kernel;

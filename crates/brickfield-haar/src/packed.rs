@@ -9,6 +9,7 @@ use brickfield_core::glam::UVec3;
 
 use crate::bits::{BitReader, BitWriter, low_bits};
 use crate::coded::BrokenSection;
+use crate::encode::LowBand;
 use crate::extent::BandBox;
 use crate::sample::Coefficient;
 use crate::transform::Bands;
@@ -18,13 +19,13 @@ const N_IN_GROUP: usize = 64;
 const GREATEST_WIDTH: u8 = 56;
 
 /// The bytes of all sections of a brick, coarsest first.
-pub(crate) fn encode<C: Coefficient>(bands: &Bands<C>) -> Vec<Vec<u8>> {
-    boxes_of(bands).map(|(array, all, boxes)| encode_section(&numbers(array, all, &boxes))).collect()
+pub(crate) fn encode<C: Coefficient>(bands: &Bands<C>, low_band: LowBand) -> Vec<Vec<u8>> {
+    boxes_of(bands, low_band).map(|(array, all, boxes)| encode_section(&numbers(array, all, &boxes))).collect()
 }
 
 /// The number of bytes that [`encode`] will make.
-pub(crate) fn n_bytes<C: Coefficient>(bands: &Bands<C>) -> usize {
-    boxes_of(bands).map(|(array, all, boxes)| n_section_bytes(array, all, &boxes)).sum()
+pub(crate) fn n_bytes<C: Coefficient>(bands: &Bands<C>, low_band: LowBand) -> usize {
+    boxes_of(bands, low_band).map(|(array, all, boxes)| n_section_bytes(array, all, &boxes)).sum()
 }
 
 fn n_section_bytes<C: Coefficient>(array: &[C], all: UVec3, boxes: &[BandBox]) -> usize {
@@ -53,14 +54,15 @@ fn n_group_bytes(union: u64, n: usize) -> usize {
     1 + ((u64::BITS - union.leading_zeros()) as usize * n).div_ceil(8)
 }
 
-/// For each section its array, the array's extent and the boxes in it.
-fn boxes_of<C: Coefficient>(bands: &Bands<C>) -> impl Iterator<Item = (&[C], UVec3, Vec<BandBox>)> {
+/// For each section its array, the array's extent and the boxes in it; no box for a low band elsewhere.
+fn boxes_of<C: Coefficient>(bands: &Bands<C>, low_band: LowBand) -> impl Iterator<Item = (&[C], UVec3, Vec<BandBox>)> {
     let n = bands.extent(Level(bands.n_levels()));
     let details = |level: u8| {
         let n = bands.extent(Level(level));
         (bands.details(Level(level)), n, BandBox::details(n).collect())
     };
-    let low = (bands.low(), n, vec![BandBox::whole(n)]);
+    let boxes = if low_band == LowBand::Stored { vec![BandBox::whole(n)] } else { Vec::new() };
+    let low = (bands.low(), n, boxes);
     std::iter::once(low).chain((0..bands.n_levels()).rev().map(details))
 }
 

@@ -1,7 +1,7 @@
 #![no_main]
 
 use brickfield_core::{Level, ScalarType};
-use brickfield_haar::{BrickHeader, Sample, decode, decode_level};
+use brickfield_haar::{BrickHeader, Sample, decode, decode_level, decode_with_low};
 use libfuzzer_sys::fuzz_target;
 
 /// Bricks of more samples are not decoded: a few bytes may state 2^28 of them.
@@ -25,6 +25,10 @@ fuzz_target!(|bytes: &[u8]| {
 
 fn all_levels<T: Sample>(bytes: &[u8], header: &BrickHeader) {
     if let Ok(decoded) = decode::<T>(bytes) {
+        assert_eq!(decoded.extent, header.extent());
+    }
+    let n_low = Level(header.n_levels()).dims_of(header.extent()).element_product() as usize;
+    if let Ok(decoded) = decode_with_low::<T>(bytes, &vec![T::saturate(7); n_low]) {
         assert_eq!(decoded.extent, header.extent());
     }
     for level in (0..=3).map(Level) {

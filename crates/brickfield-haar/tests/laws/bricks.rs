@@ -2,7 +2,7 @@
 
 use brickfield_core::Scalar;
 use brickfield_core::glam::UVec3;
-use brickfield_haar::{EncodeOptions, Kernel, Loss, Sample, Storages};
+use brickfield_haar::{EncodeOptions, Kernel, Loss, LowBand, Sample, Storages};
 use proptest::prelude::*;
 
 /// The least and the greatest sample of a type, as i64.
@@ -73,6 +73,7 @@ pub(crate) fn options() -> impl Strategy<Value = EncodeOptions> {
         storages,
         n_levels,
         loss: Loss::None,
+        low_band: LowBand::Stored,
     })
 }
 

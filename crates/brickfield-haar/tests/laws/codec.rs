@@ -3,8 +3,8 @@
 use brickfield_core::Level;
 use brickfield_core::glam::UVec3;
 use brickfield_haar::{
-    Bands, BrickHeader, Coefficient, EncodeError, EncodeOptions, Kernel, Loss, Sample, Storage, decode, decode_bricks,
-    decode_level, encode, encode_bricks,
+    Bands, BrickHeader, Coefficient, DecodeError, EncodeError, EncodeOptions, Kernel, Loss, LowBand, Sample, Storage,
+    decode, decode_bricks, decode_level, decode_with_low, encode, encode_bricks,
 };
 use proptest::prelude::*;
 
@@ -147,4 +147,45 @@ fn bricks_of_all_threads_are_those_of_one() {
     let error = encode_bricks(&[(UVec3::ONE, vec![1u8]), (UVec3::ZERO, vec![])], &EncodeOptions::default());
     assert!(matches!(error, Err(EncodeError::Extent(_))));
     assert!(decode_bricks::<u8>(&[b"no brick"]).is_err());
+}
+
+/// The low band of the kernels that average, lossless, is the next level: a brick without it is made whole by that level.
+fn low_bands_may_be_elsewhere<T: Sample>() {
+    let kernels = prop::sample::select(vec![vec![Kernel::Haar, Kernel::HaarPredicted], vec![Kernel::Haar]]);
+    hold(100, (bricks::<T>(), options(), kernels, 1..4u8), |((extent, samples), options, kernels, n_levels)| {
+        let options = EncodeOptions { kernels, n_levels: Some(n_levels), low_band: LowBand::Elsewhere, ..options };
+        let brick = encode(extent, &samples, &options).expect("options within bounds");
+        let header = BrickHeader::read(&brick).expect("a header");
+        let bands = Bands::of_samples(Kernel::Haar, extent, &samples, n_levels).expect("a brick within bounds");
+        let low: Vec<T> = bands.low().iter().map(|&c| T::truncate(c)).collect();
+        let decoded = decode_with_low(&brick, &low).map_err(|e| TestCaseError::fail(e.to_string()))?;
+        prop_assert!(decoded.extent == extent && decoded.samples == samples);
+        let has_bands = matches!(header.storage(), Storage::Coded | Storage::Packed);
+        prop_assert_eq!(header.low_band() == LowBand::Elsewhere, has_bands);
+        if has_bands {
+            prop_assert_eq!(decode::<T>(&brick).err(), Some(DecodeError::LowBandElsewhere));
+            let expected = Some(DecodeError::LowBand { expected: low.len(), given: low.len() - 1 });
+            prop_assert_eq!(decode_with_low(&brick, &low[1..]).err(), expected);
+        }
+        Ok(())
+    });
+}
+for_all_types!(low_bands_may_be_elsewhere);
+
+#[test]
+fn a_low_band_elsewhere_needs_bands_without_loss() {
+    let haar = || EncodeOptions {
+        kernels: vec![Kernel::Haar],
+        n_levels: Some(1),
+        low_band: LowBand::Elsewhere,
+        ..EncodeOptions::default()
+    };
+    let error = |options: EncodeOptions| encode(UVec3::splat(2), &[1u8; 8], &options).unwrap_err();
+    for kernel in [Kernel::LeGall53, Kernel::Median] {
+        let kernels = vec![Kernel::Haar, kernel];
+        assert_eq!(error(EncodeOptions { kernels, ..haar() }), EncodeError::NoLowBand { kernel });
+    }
+    assert_eq!(error(EncodeOptions { n_levels: Some(0), ..haar() }), EncodeError::NoLevels);
+    let loss = Loss::MaxError(1);
+    assert_eq!(error(EncodeOptions { loss, ..haar() }), EncodeError::LossyLowBand { loss });
 }

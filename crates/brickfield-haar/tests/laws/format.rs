@@ -61,9 +61,9 @@ impl<'a> Reader<'a> {
         let of_level = |level: usize| extent.map(|n| n.div_ceil(1 << level));
         let n_low = of_level(n_levels).iter().product();
         let mut low = self.section(lengths[0], n_low);
-        for i in 1..=n_levels {
+        for (i, &length) in lengths.iter().enumerate().skip(1) {
             let n = of_level(n_levels - i);
-            let details = self.section(lengths[i], n.iter().product::<usize>() - low.len());
+            let details = self.section(length, n.iter().product::<usize>() - low.len());
             low = self.finer(n, &low, &details);
         }
         low
