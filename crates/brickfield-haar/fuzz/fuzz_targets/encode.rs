@@ -34,7 +34,9 @@ fn round_trip<T: Sample, const N: usize>(content: &[u8], [options, x, y, loss]: 
     let n_levels = if options & 16 == 0 { None } else { Some(options >> 5) };
     let max_error = u32::from(loss);
     let loss = if loss == 0 { Loss::None } else { Loss::MaxError(max_error) };
-    let brick = encode(extent, samples, &EncodeOptions { kernels, storages, n_levels, loss, ..EncodeOptions::default() }).expect("a brick");
+    let brick =
+        encode(extent, samples, &EncodeOptions { kernels, storages, n_levels, loss, ..EncodeOptions::default() })
+            .expect("a brick");
     let decoded = decode::<T>(&brick).expect("a brick that was just encoded");
     let error = samples.iter().zip(&decoded.samples).map(|(a, b)| a.to_i64().abs_diff(b.to_i64())).max();
     assert_eq!(error, Some(u64::from(BrickHeader::read(&brick).expect("a header").max_error())));
