@@ -20,6 +20,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("brickfield-lod", &["core", "optics"]),
     ("brickfield-interp", &["core", "optics"]),
     ("brickfield-trim", &["core", "optics"]),
+    ("brickfield-haar", &["core"]),
     ("brickfield-frame", &["core", "optics"]),
     ("brickfield-shaders", &["core", "optics", "frame"]),
     ("brickfield-cpu", &["core", "optics", "interp", "frame"]),
@@ -28,14 +29,14 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("brickfield", BELOW),
     (
         "brickfield-conformance",
-        &["", "core", "optics", "io", "bricks", "lod", "interp", "trim", "frame", "shaders", "cpu", "wgpu", "ash"],
+        &["", "core", "optics", "io", "bricks", "lod", "interp", "trim", "haar", "frame", "shaders", "cpu", "wgpu", "ash"],
     ),
     ("xtask", &[]),
 ];
 
 /// Everything below the front door; a name without prefix is short for `brickfield-` and that name, "" for `brickfield`.
 const BELOW: &[&str] =
-    &["core", "optics", "io", "bricks", "lod", "interp", "trim", "frame", "shaders", "cpu", "wgpu", "ash"];
+    &["core", "optics", "io", "bricks", "lod", "interp", "trim", "haar", "frame", "shaders", "cpu", "wgpu", "ash"];
 
 /// Outside packages that only one package may name.
 const OWNED: &[(&str, &str)] = &[
