@@ -29,7 +29,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("brickfield", BELOW),
     (
         "brickfield-conformance",
-        &["", "core", "optics", "io", "bricks", "lod", "interp", "trim", "haar", "frame", "shaders", "cpu", "wgpu", "ash"],
+        &[
+            "", "core", "optics", "io", "bricks", "lod", "interp", "trim", "haar", "frame", "shaders", "cpu", "wgpu",
+            "ash",
+        ],
     ),
     ("xtask", &[]),
 ];
