@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use brickfield_core::glam::{DVec3, UVec2, UVec3};
+use brickfield_core::glam::{UVec2, UVec3};
 use brickfield_core::{Aabb, Companion, TransferFunction};
 use brickfield_optics::{LightSource, Normals, QuadratureRule};
 
@@ -267,7 +267,7 @@ impl FramePlan {
         let slot = self.field.index().at(cell).slot();
         let Some((kept, slot)) = self.kept.as_ref().zip(slot) else { return b };
         let kept = kept.boxes()[slot as usize];
-        let beside = DVec3::splat(reach) / self.rays.planes.voxel_world;
+        let beside = reach * self.rays.voxels_per_unit;
         let center = self.rays.center;
         b.intersection(&Aabb { min: kept.min - beside - center, max: kept.max + beside - center })
     }

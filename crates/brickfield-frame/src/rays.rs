@@ -23,6 +23,8 @@ pub struct RayFrame {
     pub anchor: [DVec3; 3],
     /// Direction before normalisation, voxels per world unit; and its change a pixel to the right, a pixel down.
     pub direction: [DVec3; 3],
+    /// How many voxels a world unit reaches along each axis of the grid, at most.
+    pub voxels_per_unit: DVec3,
     /// Side of a pixel in the plane at distance 1; 0 for parallel rays.
     pub pixel: f64,
     /// Distance from the eye to the anchor of the central ray, less `start`.
@@ -42,6 +44,12 @@ pub struct RayFrame {
 
 /// Roundings of a term of a position, times the unit roundoff of f32.
 const ROUNDING: f64 = 8.0 / (1u32 << 24) as f64;
+/// How many voxels a world unit reaches along each axis, at most: that in the direction across the voxels' faces.
+pub(crate) fn voxels_per_unit(grid: &Grid) -> DVec3 {
+    let gradient = grid.world_to_index().matrix3.transpose();
+    DVec3::from([gradient.x_axis, gradient.y_axis, gradient.z_axis].map(DVec3::length))
+}
+
 /// Polygons reach a little beyond the outer pixels' rays.
 const STRETCH_MARGIN: f64 = 1.01;
 
@@ -85,6 +93,7 @@ impl RayFrame {
             center,
             anchor: [anchor0, right, down],
             direction: [forward, DVec3::ZERO, DVec3::ZERO],
+            voxels_per_unit: voxels_per_unit(grid),
             pixel: 0.0,
             anchor_past_start: depth,
             anchor_depth: 0.0,

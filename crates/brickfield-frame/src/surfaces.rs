@@ -3,6 +3,7 @@
 use brickfield_core::glam::DVec3;
 use brickfield_core::{Aabb, Grid, Level};
 
+use crate::rays::voxels_per_unit;
 use crate::{Division, PlanRay, Sampling};
 
 /// The surfaces between which segments lie: the proxy geometries of LaMar, Hamann and Joy 1999, section 4.2.
@@ -104,10 +105,8 @@ impl Steps {
 
 impl PlaneStacks {
     pub(crate) fn new(grid: &Grid, domain: &Aabb) -> PlaneStacks {
-        let gradient = grid.world_to_index().matrix3.transpose();
-        let [x, y, z] = [gradient.x_axis, gradient.y_axis, gradient.z_axis].map(DVec3::length);
         let half = 0.5 * domain.extent() + BEFORE;
-        PlaneStacks { voxel_world: DVec3::new(x, y, z).recip(), low: -half, high: half }
+        PlaneStacks { voxel_world: voxels_per_unit(grid).recip(), low: -half, high: half }
     }
 
     pub(crate) fn most_segments(&self, step_world: f64) -> f64 {

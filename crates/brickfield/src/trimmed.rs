@@ -500,7 +500,7 @@ mod tests {
             let plan = prepare_trimmed(&source, &slices, trimming, &mut TrimResidency::default()).unwrap();
             plan.proxy().unwrap().n_polygons()
         };
-        assert!(n_polygons(Trimming::Packed) < n_polygons(Trimming::Visible));
+        assert!(3 * n_polygons(Trimming::Packed) < n_polygons(Trimming::Visible));
         let too_small = MergeOptions::of_bricks(BrickSide::S16);
         let wide = TrimmedVolume::new(volume(UVec3::new(61, 46, 31), 3), BrickSide::S32);
         let refused = prepare_trimmed(&wide, &scene, Trimming::Merged(too_small), &mut TrimResidency::default());
