@@ -6,8 +6,8 @@ use brickfield_bricks::SourceId;
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, BrickId, BrickLayout, BrickSide, Grid, Level, Place, Scalar, Volume, with_voxels};
 use brickfield_frame::{
-    Chunk, DarkRegions, Drawing, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, KeptBoxes, Lighting,
-    Places, PlanError, PlanParts, QuadratureRule, Reach, SampleFormat, Slices, Slots,
+    Chunk, DarkRegions, Decode, Drawing, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, KeptBoxes,
+    Lighting, Places, PlanError, PlanParts, QuadratureRule, Reach, SampleFormat, Slices, Slots,
 };
 use brickfield_lod::back_to_front;
 use brickfield_trim::{
@@ -131,7 +131,9 @@ struct Held {
     trimming: Trimming,
     reach: u32,
     dark: DarkValues,
+    /// What may be seen of each brick; what is read of it.
     trimmed: TrimmedBricks,
+    grown: TrimmedBricks,
     stored: StoredBricks,
     /// By brick.
     chunks: Vec<Option<Arc<Chunk>>>,
@@ -188,14 +190,16 @@ impl TrimResidency {
         let held = match before {
             Some(held) if n_changed == 0 => Held { dark, ..held },
             before => {
-                let stored = match store(&trimmed, trimming, reach) {
+                let grown = trimmed.grown(reach);
+                let stored = match store(&grown, trimming) {
                     Ok(stored) => stored,
                     Err(error) => {
                         self.held = before;
                         return Err(error);
                     }
                 };
-                let (held, copied) = Held::new(source, (trimming, reach), dark, trimmed, stored, before);
+                let bricks = (trimmed, grown, stored);
+                let (held, copied) = Held::new(source, (trimming, reach), dark, bricks, before.as_ref());
                 self.copied = copied;
                 held
             }
@@ -204,17 +208,14 @@ impl TrimResidency {
     }
 }
 
-/// Where the samples of bricks are stored that are read within `reach` samples of visible ones.
-fn store(trimmed: &TrimmedBricks, trimming: Trimming, reach: u32) -> Result<StoredBricks, PrepareTrimmedError> {
-    let grown = || trimmed.grown(reach);
+/// Where the samples of bricks are stored, of which these are read.
+fn store(read: &TrimmedBricks, trimming: Trimming) -> Result<StoredBricks, PrepareTrimmedError> {
     Ok(match trimming {
-        Trimming::Conventional | Trimming::Envelope => {
-            pack_bricks(&TrimmedBricks::whole(*trimmed.layout()), MAX_TEXELS)?
-        }
-        Trimming::Visible => pack_bricks(&grown().untrimmed(), MAX_TEXELS)?,
-        Trimming::Alone => store_alone(&grown(), MAX_TEXELS)?,
-        Trimming::Merged(options) => merge_bricks(&grown(), &options)?.store(MAX_TEXELS)?,
-        Trimming::Packed => pack_bricks(&grown(), MAX_TEXELS)?,
+        Trimming::Conventional | Trimming::Envelope => pack_bricks(&TrimmedBricks::whole(*read.layout()), MAX_TEXELS)?,
+        Trimming::Visible => pack_bricks(&read.untrimmed(), MAX_TEXELS)?,
+        Trimming::Alone => store_alone(read, MAX_TEXELS)?,
+        Trimming::Merged(options) => merge_bricks(read, &options)?.store(MAX_TEXELS)?,
+        Trimming::Packed => pack_bricks(read, MAX_TEXELS)?,
     })
 }
 
@@ -223,12 +224,11 @@ impl Held {
         source: &TrimmedVolume,
         (trimming, reach): (Trimming, u32),
         dark: DarkValues,
-        trimmed: TrimmedBricks,
-        stored: StoredBricks,
-        before: Option<Held>,
+        (trimmed, grown, stored): (TrimmedBricks, TrimmedBricks, StoredBricks),
+        before: Option<&Held>,
     ) -> (Held, Copied) {
         let kept_chunk = |i: usize| {
-            let held = before.as_ref()?;
+            let held = before?;
             held.chunks[i].clone().filter(|_| held.stored.places()[i] == stored.places()[i])
         };
         let chunk = |(i, place): (usize, &Option<Place>)| {
@@ -252,13 +252,13 @@ impl Held {
         let (format, decode) = coding(source);
         let places = Places::Table { texels: stored.texels().max(UVec3::ONE), places };
         let slots = Slots::new(format, decode, places, chunks.clone()).expect("bricks fill their places");
-        let kept = KeptBoxes::new(layout_boxes(&trimmed));
+        let kept = KeptBoxes::new(kept_boxes(&trimmed));
         let (slots, kept, index) = match before {
-            Some(held) => (slots.following(&held.slots), kept.following(&held.kept), held.index),
+            Some(held) => (slots.following(&held.slots), kept.following(&held.kept), held.index.clone()),
             None => (slots, kept, None),
         };
         let (slots, kept) = (Arc::new(slots), Arc::new(kept));
-        (Held { source: source.id, trimming, reach, dark, trimmed, stored, chunks, slots, kept, index }, copied)
+        (Held { source: source.id, trimming, reach, dark, trimmed, grown, stored, chunks, slots, kept, index }, copied)
     }
 
     /// The field of the bricks that are drawn.
@@ -277,13 +277,13 @@ impl Held {
     }
 
     /// Whether something of a brick is read while it is drawn.
-    fn is_drawn(&self, ordinal: usize, grown: &TrimmedBricks) -> bool {
-        self.trimming == Trimming::Conventional || !grown.kept()[ordinal].is_empty()
+    fn is_drawn(&self, ordinal: usize) -> bool {
+        self.trimming == Trimming::Conventional || !self.grown.kept()[ordinal].is_empty()
     }
 }
 
 /// The boxes around what may be seen of each brick, in sample space.
-fn layout_boxes(trimmed: &TrimmedBricks) -> Vec<Aabb> {
+fn kept_boxes(trimmed: &TrimmedBricks) -> Vec<Aabb> {
     let layout = trimmed.layout();
     let last = layout.dims() - 1;
     let of_brick = |id: BrickId| {
@@ -302,7 +302,7 @@ fn layout_boxes(trimmed: &TrimmedBricks) -> Vec<Aabb> {
     layout.bricks(Level(0)).map(of_brick).collect()
 }
 
-fn coding(source: &TrimmedVolume) -> (SampleFormat, brickfield_frame::Decode) {
+fn coding(source: &TrimmedVolume) -> (SampleFormat, Decode) {
     let volume = &source.volume;
     let range = volume.rescale().stored_range(volume.range());
     let (format, stored) = SampleFormat::encoding(volume.voxels().scalar_type(), range);
@@ -359,9 +359,8 @@ pub fn prepare_trimmed(
     let Course { domain, sampling, rays } = Course::new(grid, scene, Level(0))?;
     let reach = reach_of(grid, scene);
     let held = residency.hold(source, scene, trimming, reach)?;
-    let grown = held.trimmed.grown(reach);
     let in_domain = |id: &BrickId| !to_sample_space(layout.index_box(*id)).intersection(&domain).is_empty();
-    let is_drawn = |id: &BrickId| held.is_drawn(layout.ordinal(*id), &grown) && in_domain(id);
+    let is_drawn = |id: &BrickId| held.is_drawn(layout.ordinal(*id)) && in_domain(id);
     let drawn: Vec<BrickId> = layout.bricks(Level(0)).filter(is_drawn).collect();
     let drawing = match scene.technique {
         Technique::RayCasting => Drawing::Rays,

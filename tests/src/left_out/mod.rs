@@ -118,18 +118,19 @@ pub fn left_out(args: &LeftOutArgs) -> Result<Vec<String>, PaperError> {
     Ok(complaints)
 }
 
-/// The plan with every feature that its data allow. Features that change the picture, and those whose data it lacks, stay as they are.
+/// The plan with every feature that its data allow. Features that change the picture, and those whose data it lacks, stay as they are: a
+/// headlight has no place.
 fn general(plan: &FramePlan) -> FramePlan {
     let is_of_blocks = matches!(plan.field().slots().places(), Places::Blocks(_));
     let is_allowed = |feature: &Feature| match feature {
         Feature::SkipEmpty | Feature::MultiLevel | Feature::TransferLookup => true,
         Feature::ShortBlocks => is_of_blocks,
-        Feature::LightBesideEye => plan.lighting().is_some(),
         Feature::HardwareFilter
         | Feature::EarlyTermination
         | Feature::SkipDark
         | Feature::SkipBesideBeams
         | Feature::Light
+        | Feature::LightBesideEye
         | Feature::StoredGradients
         | Feature::Prefiltered => false,
     };
