@@ -225,6 +225,11 @@ fn a_store_without_a_budget_is_held_to_the_limit_of_the_reader() {
         "{}",
         text(&out.stderr)
     );
+    for words in ["--classify|prefiltered", "--light|head|--normals|stored"] {
+        let out = render(&format!("|{words}"));
+        assert_eq!(out.status.code(), Some(2), "{words}");
+        assert!(text(&out.stderr).contains("and a store exclude each other: it has values alone"), "{words}");
+    }
     for words in ["|--block-level|1", "|--budget-mib|1.5", "|--ratio|2"] {
         assert_eq!(render(words).status.code(), Some(0), "{words}");
     }
@@ -340,7 +345,7 @@ fn bricks_that_show_nothing_are_boxes_only_if_all_are_asked_for() {
 }
 
 /// Arguments after `render`, the status, and what the message must hold.
-const REFUSED: [(&str, i32, &str); 46] = [
+const REFUSED: [(&str, i32, &str); 52] = [
     ("b.nrrd|-o|a.png", 1, "b.nrrd"),
     ("a.nrrd|-o|a.jpg", 2, "a.jpg: pictures are written as .exr or .png"),
     ("a.nrrd|-o|no/a.png", 2, "no/a.png: there is no folder no"),
@@ -397,6 +402,12 @@ const REFUSED: [(&str, i32, &str); 46] = [
     ),
     ("a.nrrd|-o|a.png|--light|head|--lit-sides|left", 2, "lower or both"),
     ("a.nrrd|-o|a.png|--light|head|--normals|stored", 2, "--blocks <N>"),
+    ("a.nrrd|-o|a.png|--trim|packed|--light|head|--normals|stored", 2, "--blocks <N>"),
+    ("a.nrrd|-o|a.png|--trim|packed|--ratio|8", 2, "--blocks <N>"),
+    ("a.nrrd|-o|a.png|--trim|packed|--blocks|8", 2, "--trim and --blocks exclude each other"),
+    ("a.nrrd|-o|a.png|--trim|packed|--lod|1", 2, "--lod and --trim exclude each other"),
+    ("a.nrrd|-o|a.png|--blocks|8|--lod|error=2", 2, "--lod and --blocks exclude each other"),
+    ("a.nrrd|-o|a.png|--blocks|8|--classify|prefiltered|--rule|pre-integrated", 2, "--classify prefiltered and --rule"),
     ("a.nrrd|-o|a.png|--ambient|1", 2, "--light <FROM>"),
     ("a.nrrd|-o|.|--size|8x8", 2, "exr or .png"),
     ("a.nrrd|-o|a.png|--raw|99x99x99,u8", 1, "a.nrrd"),

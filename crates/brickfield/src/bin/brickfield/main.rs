@@ -140,8 +140,8 @@ struct RenderArgs {
     flat: BlockArgs,
     /// Draw bricks of the finest level as far as they may be seen (Tong, Wang, Tsang and Tang 1999): alone, merged or packed (their
     /// samples trimmed along one axis, merged into texture chunks, or trimmed along all axes), visible or envelope (whole
-    /// bricks), or conventional (everything); the same picture
-    #[arg(long, value_name = "HOW", conflicts_with_all = ["blocks", "show_bricks"],
+    /// bricks), or conventional (everything); the same picture (--blocks, --downsampling and --lod are not for them)
+    #[arg(long, value_name = "HOW", conflicts_with = "show_bricks",
           value_parser = PossibleValuesParser::new(Trimming::NAMES), hide_possible_values = true)]
     trim: Option<String>,
     #[arg(long, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "drawn",

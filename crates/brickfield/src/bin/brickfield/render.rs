@@ -7,15 +7,17 @@ use std::sync::Arc;
 use brickfield::StoreBlocks;
 use brickfield::bricks::block_memory;
 use brickfield::core::{BlockSide, BrickId, Image, Level};
-use brickfield::frame::{Backend, Frame, FramePlan, Slots};
-use brickfield::lod::{BlockLevels, select_cut};
+use brickfield::frame::{Backend, Frame, FramePlan, QuadratureRule, Slots};
+use brickfield::lod::{BlockLevels, Criterion, select_cut};
+#[cfg(feature = "formats")]
+use brickfield::optics::Normals;
 #[cfg(feature = "formats")]
 use brickfield::options::Blocks;
-use brickfield::options::{BlockSubject, Boxes, Subject, values};
+use brickfield::options::{BlockSubject, Boxes, OptionError, Subject, values};
 use brickfield::overlay::{LevelColor, show_bricks, show_bricks_faintly};
 use brickfield::{
-    BackendError, BackendKind, BlockResidency, Residency, Scene, Technique, TrimResidency, TrimmedVolume, Trimming,
-    check_picture_path, open_backend, prepare, prepare_blocks, prepare_trimmed, write_picture,
+    BackendError, BackendKind, BlockResidency, Classification, Residency, Scene, Technique, TrimResidency,
+    TrimmedVolume, Trimming, check_picture_path, open_backend, prepare, prepare_blocks, prepare_trimmed, write_picture,
 };
 
 use crate::{Failure, RenderArgs, mib, print};
@@ -26,6 +28,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     args.view.check()?;
     args.sampling.check()?;
     args.light.check()?;
+    check_together(args)?;
     let mut backend = open(args)?;
     if let Some(side) = args.flat.blocks {
         return render_blocks(args, side, backend.as_mut());
@@ -53,12 +56,54 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     check_validation(&backend.validation_messages())
 }
 
+/// Options of octree, trimmed bricks and flat blocks that exclude each other.
+fn check_together(args: &RenderArgs) -> Result<(), OptionError> {
+    let exclude = |first: &str, second: &str, reason| {
+        Err(OptionError::Exclude { first: first.to_owned(), second: second.to_owned(), reason })
+    };
+    // clap drops the requirements of options whose requirement is excluded: it is not told that --trim excludes --blocks.
+    let of_its_own = match (args.flat.blocks, &args.trim) {
+        (Some(_), Some(_)) => return exclude("--trim", "--blocks", "bricks are trimmed, or flat blocks are drawn"),
+        (Some(_), None) => "--blocks",
+        (None, Some(_)) => "--trim",
+        (None, None) => return Ok(()),
+    };
+    if args.view.lod != [Criterion::FullResolution] {
+        return exclude("--lod", of_its_own, "it selects bricks of the octree");
+    }
+    if (args.flat.classify, args.sampling.rule) == (Classification::Prefiltered, Some(QuadratureRule::PreIntegrated)) {
+        return exclude(
+            "--classify prefiltered",
+            "--rule pre-integrated",
+            "the rule looks at the values between its nodes",
+        );
+    }
+    Ok(())
+}
+
+/// A store has values alone: options that ask for more are refused before anything is read of it.
+#[cfg(feature = "formats")]
+fn check_of_store(args: &RenderArgs, blocks: &Blocks) -> Result<(), OptionError> {
+    let option = match (args.flat.classify, args.light.normals) {
+        _ if blocks.volume().is_some() => return Ok(()),
+        (Classification::Prefiltered, _) => "--classify prefiltered",
+        (_, Normals::Stored) => "--normals stored",
+        _ => return Ok(()),
+    };
+    let reason = "it has values alone; read another format, or leave the option out";
+    Err(OptionError::Exclude { first: option.to_owned(), second: "a store".to_owned(), reason })
+}
+
 /// Renders flat blocks.
 fn render_blocks(args: &RenderArgs, side: BlockSide, backend: &mut dyn Backend) -> Result<(), Failure> {
     let subject = args.flat.open(&args.file, &args.input, side, &args.view)?;
+    #[cfg(feature = "formats")]
+    check_of_store(args, &subject.blocks)?;
     let source = subject.blocks.source();
     let scene = args.view.scene_of(source.grid(), subject.frame, &subject.transfer)?;
-    let scene = args.sampling.of(scene, subject.blocks.volume())?;
+    // Prefiltered samples know of peaks between them; pre-integration would know nothing of spreads.
+    let volume = subject.blocks.volume().filter(|_| args.flat.classify == Classification::OfMean);
+    let scene = args.sampling.of(scene, volume)?;
     let scene = args.light.of(scene, source.range(), source.grid())?;
     let selection = args.flat.select(&subject, &scene)?;
     let (levels, mut residency) = (&selection.levels, BlockResidency::default());
