@@ -151,7 +151,7 @@ pub struct SamplingOptions {
     #[arg(long, value_name = "VOXELS", default_value_t = 0.5, value_parser = values::step, allow_hyphen_values = true)]
     pub step: f64,
     /// Quadrature rule: left-riemann, left-exponential, midpoint, pre-integrated or gauss2; midpoint unless stated, or
-    /// pre-integrated where samples would step over a peak of the transfer function
+    /// pre-integrated where samples would step over a peak of the transfer function (not of a store that is drawn as blocks, nor with --classify prefiltered)
     #[arg(long, value_parser = values::rule)]
     pub rule: Option<QuadratureRule>,
     /// Surfaces between which samples lie: shells (spheres around the eye), tessellated-shells[=PIXELS] (their triangles:
@@ -376,7 +376,15 @@ impl ViewOptions {
     #[cfg(feature = "formats")]
     fn transfer_of_store(&self, store: &StoreBlocks) -> Result<TransferFunction, OptionError> {
         Ok(match self.named_transfer()? {
-            NamedTransfer::Automatic => brickfield_optics::automatic(&store.overview(StoreBlocks::OVERVIEW_BYTES)?),
+            NamedTransfer::Automatic => {
+                let overview = store.overview(StoreBlocks::OVERVIEW_BYTES)?;
+                if overview.grid().dims() != store.grid().dims() {
+                    note(
+                        &"--transfer auto is chosen from a coarse level of the store: the volume in memory may get another one",
+                    );
+                }
+                brickfield_optics::automatic(&overview)
+            }
             NamedTransfer::Preset(preset) => preset.transfer(store.range(), diagonal_world(store.grid()))?,
             NamedTransfer::OfFile(transfer) => transfer,
         })
@@ -420,7 +428,8 @@ impl ViewOptions {
 }
 
 impl SamplingOptions {
-    /// The scene of a volume, sampled as asked for. The default rule depends on the volume, if it is in memory.
+    /// The scene of a volume, sampled as asked for. The default rule depends on the volume, if it is in memory; of a store it is the
+    /// midpoint rule.
     ///
     /// # Errors
     /// Options that exclude each other.
