@@ -13,7 +13,7 @@ use brickfield_frame::{
 use rayon::prelude::*;
 
 use crate::Copied;
-use crate::encode::encode;
+use crate::encode::Coding;
 
 /// The flat blocks of the last frame, packed into one texture.
 ///
@@ -61,7 +61,7 @@ enum Arrangement {
 }
 
 /// Texels along x and y of a texture, at most: every Vulkan device takes so many.
-const MAX_TEXELS: u32 = 2048;
+pub(crate) const MAX_TEXELS: u32 = 2048;
 /// Texels that blocks of one level may take in their order: rows tell so many layers apart.
 const MOST_TEXELS: UVec3 = UVec3::new(MAX_TEXELS, MAX_TEXELS, 1024);
 /// Blocks are packed anew if their texture has this many times the cubes that they need, and a few more.
@@ -96,9 +96,9 @@ impl BlockResidency {
         let is_new = |i: &usize| before.is_none_or(|held| held.rows[*i].level != levels[*i]);
         let mut new: Vec<usize> = (0..levels.len()).filter(is_new).collect();
         new.sort_by_cached_key(|i| (levels[*i], along_cubes(source.layout().block(*i))));
-        let coding = Coding::of(source);
+        let coding = coding_of(source);
         let fetched: Vec<Vec<u8>> =
-            new.par_iter().map(|i| coding.fetch(source, *i, levels[*i])).collect::<Result<_, _>>()?;
+            new.par_iter().map(|i| fetch(source, &coding, *i, levels[*i])).collect::<Result<_, _>>()?;
         let beside = companions.iter().map(|companion| {
             let is_held = before.is_some_and(|held| held.companions.contains_key(companion));
             FetchedCompanions::fetch(source, *companion, if is_held { new.clone() } else { all(levels) }, levels)
@@ -142,7 +142,7 @@ impl BlockResidency {
         });
         let field = match held.companions.contains_key(&Companion::Spread) {
             true => {
-                let ranges = Arc::clone(held.ranges.get_or_insert_with(|| Arc::new(Coding::of(source).ranges(source))));
+                let ranges = Arc::clone(held.ranges.get_or_insert_with(|| Arc::new(ranges(source))));
                 field.with_ranges(ranges).expect("a range for each block")
             }
             false => field,
@@ -192,10 +192,9 @@ impl Held {
     }
 
     fn slots(&self, source: &dyn BlockSource) -> Slots {
-        let coding = Coding::of(source);
+        let coding = coding_of(source);
         let places = BlockPlaces::new(*source.layout(), self.texels(), self.rows.clone());
-        let decode = coding.stored.rescaled(source.rescale());
-        let slots = Slots::new(coding.format, decode, Places::Blocks(places), self.chunks.clone());
+        let slots = Slots::new(coding.format, coding.decode(), Places::Blocks(places), self.chunks.clone());
         slots.expect("blocks fill their places")
     }
 
@@ -369,34 +368,25 @@ fn along_cubes(block: UVec3) -> u128 {
     (0..3).flat_map(|axis| bits(axis, block[axis as usize])).sum()
 }
 
-/// How the samples of a source are held for a backend.
-struct Coding {
-    format: SampleFormat,
-    stored: Decode,
+fn coding_of(source: &dyn BlockSource) -> Coding {
+    Coding::of(source.scalar_type(), source.rescale(), source.range())
 }
 
-impl Coding {
-    fn of(source: &dyn BlockSource) -> Coding {
-        let range = source.rescale().stored_range(source.range());
-        let (format, stored) = SampleFormat::encoding(source.scalar_type(), range);
-        Coding { format, stored }
-    }
+/// The ranges of all blocks, as texture reads would return them.
+fn ranges(source: &dyn BlockSource) -> BlockRanges {
+    let Decode { scale, offset } = coding_of(source).stored;
+    let read = |stored: f64| ((stored - offset) / scale) as f32;
+    let reads = source.summaries().iter().map(|summary| {
+        let ValueRange { min, max } = source.rescale().stored_range(summary.range);
+        [read(min), read(max)]
+    });
+    BlockRanges::new(reads.collect())
+}
 
-    /// The ranges of all blocks, as texture reads would return them.
-    fn ranges(&self, source: &dyn BlockSource) -> BlockRanges {
-        let read = |stored: f64| ((stored - self.stored.offset) / self.stored.scale) as f32;
-        let reads = source.summaries().iter().map(|summary| {
-            let ValueRange { min, max } = source.rescale().stored_range(summary.range);
-            [read(min), read(max)]
-        });
-        BlockRanges::new(reads.collect())
-    }
-
-    fn fetch(&self, source: &dyn BlockSource, ordinal: usize, level: Level) -> Result<Vec<u8>, FetchError> {
-        let mut bytes = Vec::new();
-        source.fetch(source.layout().block(ordinal), level, &mut bytes)?;
-        Ok(encode(bytes, source.scalar_type(), self.format, self.stored))
-    }
+fn fetch(source: &dyn BlockSource, coding: &Coding, ordinal: usize, level: Level) -> Result<Vec<u8>, FetchError> {
+    let mut bytes = Vec::new();
+    source.fetch(source.layout().block(ordinal), level, &mut bytes)?;
+    Ok(coding.encode(bytes))
 }
 
 #[cfg(test)]

@@ -1,10 +1,38 @@
 //! From samples as they are stored to samples as a backend reads them.
 
-use brickfield_core::ScalarType;
+use brickfield_core::{Rescale, ScalarType, ValueRange};
 use brickfield_frame::{Decode, SampleFormat};
 
+/// How the samples of a source are held for a backend.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Coding {
+    scalar: ScalarType,
+    rescale: Rescale,
+    pub(crate) format: SampleFormat,
+    /// From a texture read to the stored number.
+    pub(crate) stored: Decode,
+}
+
+impl Coding {
+    /// Of samples of a type, with a map to values, and values in a range.
+    pub(crate) fn of(scalar: ScalarType, rescale: Rescale, range: ValueRange) -> Coding {
+        let (format, stored) = SampleFormat::encoding(scalar, rescale.stored_range(range));
+        Coding { scalar, rescale, format, stored }
+    }
+
+    /// From a texture read to the value.
+    pub(crate) fn decode(&self) -> Decode {
+        self.stored.rescaled(self.rescale)
+    }
+
+    /// Little-endian samples in the form of a backend.
+    pub(crate) fn encode(&self, bytes: Vec<u8>) -> Vec<u8> {
+        encode(bytes, self.scalar, self.format, self.stored)
+    }
+}
+
 /// Little-endian samples of a type in the form of [`SampleFormat::encoding`], which `decode` undoes.
-pub(crate) fn encode(mut bytes: Vec<u8>, scalar: ScalarType, format: SampleFormat, decode: Decode) -> Vec<u8> {
+fn encode(mut bytes: Vec<u8>, scalar: ScalarType, format: SampleFormat, decode: Decode) -> Vec<u8> {
     match scalar {
         ScalarType::U8 | ScalarType::U16 => bytes,
         ScalarType::I8 | ScalarType::I16 => {

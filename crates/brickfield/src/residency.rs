@@ -7,13 +7,13 @@ use brickfield_bricks::{BrickTree, TreeId};
 use brickfield_core::glam::UVec3;
 use brickfield_core::{BrickId, Level, TransferFunction};
 use brickfield_frame::{
-    Chunk, DarkRegions, Decode, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, MacrocellRanges,
-    Occupancy, Places, Reach, SampleFormat, Slots,
+    Chunk, DarkRegions, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, MacrocellRanges, Occupancy,
+    Places, Reach, Slots,
 };
 use rayon::prelude::*;
 
 use crate::Scene;
-use crate::encode::encode;
+use crate::encode::Coding;
 
 /// The bricks of the last frame, in their slots, and the ranges and distances of their macrocells.
 ///
@@ -100,12 +100,10 @@ impl Residency {
             return field.clone();
         }
         let range = tree.summary(tree.layout().root()).range;
-        let stored_range = tree.rescale().stored_range(range);
-        let (format, stored) = SampleFormat::encoding(tree.scalar_type(), stored_range);
-        self.copied = self.table.hold(bricks, |id| gather(tree, id, format, stored));
-        let decode = stored.rescaled(tree.rescale());
+        let coding = Coding::of(tree.scalar_type(), tree.rescale(), range);
+        self.copied = self.table.hold(bricks, |id| gather(tree, id, &coding));
         let side = tree.layout().side();
-        let slots = Slots::new(format, decode, Places::Even(side), self.table.samples.clone());
+        let slots = Slots::new(coding.format, coding.decode(), Places::Even(side), self.table.samples.clone());
         let index = self.table.index(tree);
         let index = match &self.field {
             Some(before) => index.following(before.index()),
@@ -226,10 +224,10 @@ impl Transparent {
     }
 }
 
-/// A brick's samples in the stored form of [`SampleFormat::encoding`].
-fn gather(tree: &BrickTree, id: BrickId, format: SampleFormat, decode: Decode) -> Chunk {
+/// A brick's samples in the form of a backend.
+fn gather(tree: &BrickTree, id: BrickId, coding: &Coding) -> Chunk {
     let samples = tree.samples(id);
     let mut bytes = vec![0; samples.n_bytes()];
     samples.copy_le_bytes(&mut bytes);
-    Chunk::new(encode(bytes, tree.scalar_type(), format, decode))
+    Chunk::new(coding.encode(bytes))
 }

@@ -6,8 +6,8 @@ use brickfield_bricks::SourceId;
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, BrickId, BrickLayout, BrickSide, Grid, Level, Place, Scalar, Volume, with_voxels};
 use brickfield_frame::{
-    Chunk, DarkRegions, Decode, Drawing, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, KeptBoxes,
-    Lighting, Places, PlanError, PlanParts, QuadratureRule, Reach, SampleFormat, Slices, Slots,
+    Chunk, DarkRegions, Drawing, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, KeptBoxes, Lighting,
+    Places, PlanError, PlanParts, QuadratureRule, Reach, Slices, Slots,
 };
 use brickfield_lod::back_to_front;
 use brickfield_trim::{
@@ -16,8 +16,9 @@ use brickfield_trim::{
 };
 use rayon::prelude::*;
 
+use crate::block_residency::MAX_TEXELS;
 use crate::course::{Course, to_sample_space, voxels_in_step};
-use crate::encode::encode;
+use crate::encode::Coding;
 use crate::prepare::{check_polygons, check_size, check_values};
 use crate::{Copied, PrepareError, Scene, Skipping, Technique};
 
@@ -142,8 +143,8 @@ struct Held {
     index: Option<Arc<IndexGrid>>,
 }
 
-/// Texels along a side of the texture: every Vulkan device takes so many.
-const MAX_TEXELS: UVec3 = UVec3::splat(2048);
+/// Texels of the texture along x, y, z, at most.
+const MOST_TEXELS: UVec3 = UVec3::splat(MAX_TEXELS);
 
 impl TrimResidency {
     /// The bricks whose samples the last frame gathered.
@@ -173,49 +174,45 @@ impl TrimResidency {
         trimming: Trimming,
         reach: u32,
     ) -> Result<&mut Held, PrepareTrimmedError> {
-        (self.copied, self.n_reclassified) = (Copied::default(), 0);
         let dark = DarkValues::of(&scene.transfer);
         let is_kept = |held: &Held| (held.source, held.trimming, held.reach) == (source.id, trimming, reach);
-        let before = self.held.take().filter(is_kept);
-        let (trimmed, n_changed) = match &before {
-            Some(held) if held.dark == dark => (held.trimmed.clone(), 0),
+        let before = self.held.as_ref().filter(|held| is_kept(held));
+        let (trimmed, n_changed) = match before {
+            Some(held) if held.dark == dark => (None, 0),
             Some(held) => {
                 let mut trimmed = held.trimmed.clone();
                 let changed = reclassify(&mut trimmed, &source.arrays, &dark).expect("bricks of the same volume");
-                (trimmed, changed.len())
+                ((!changed.is_empty()).then_some(trimmed), changed.len())
             }
-            None => (trim_bricks(&source.arrays, &dark, Interpolation::Trilinear), source.arrays.arrays().len()),
+            None => (Some(trim_bricks(&source.arrays, &dark, Interpolation::Trilinear)), source.arrays.arrays().len()),
+        };
+        let new = match trimmed {
+            Some(trimmed) => {
+                let grown = trimmed.grown(reach);
+                let stored = store(&grown, trimming)?;
+                Some(Held::new(source, (trimming, reach), dark.clone(), (trimmed, grown, stored), before))
+            }
+            None => None,
         };
         self.n_reclassified = n_changed;
-        let held = match before {
-            Some(held) if n_changed == 0 => Held { dark, ..held },
-            before => {
-                let grown = trimmed.grown(reach);
-                let stored = match store(&grown, trimming) {
-                    Ok(stored) => stored,
-                    Err(error) => {
-                        self.held = before;
-                        return Err(error);
-                    }
-                };
-                let bricks = (trimmed, grown, stored);
-                let (held, copied) = Held::new(source, (trimming, reach), dark, bricks, before.as_ref());
-                self.copied = copied;
-                held
-            }
-        };
-        Ok(self.held.insert(held))
+        self.copied = Copied::default();
+        if let Some((held, copied)) = new {
+            (self.held, self.copied) = (Some(held), copied);
+        }
+        let held = self.held.as_mut().expect("bricks of before, or new ones");
+        held.dark = dark;
+        Ok(held)
     }
 }
 
 /// Where the samples of bricks are stored, of which these are read.
 fn store(read: &TrimmedBricks, trimming: Trimming) -> Result<StoredBricks, PrepareTrimmedError> {
     Ok(match trimming {
-        Trimming::Conventional | Trimming::Envelope => pack_bricks(&TrimmedBricks::whole(*read.layout()), MAX_TEXELS)?,
-        Trimming::Visible => pack_bricks(&read.untrimmed(), MAX_TEXELS)?,
-        Trimming::Alone => store_alone(read, MAX_TEXELS)?,
-        Trimming::Merged(options) => merge_bricks(read, &options)?.store(MAX_TEXELS)?,
-        Trimming::Packed => pack_bricks(read, MAX_TEXELS)?,
+        Trimming::Conventional | Trimming::Envelope => pack_bricks(&TrimmedBricks::whole(*read.layout()), MOST_TEXELS)?,
+        Trimming::Visible => pack_bricks(&read.untrimmed(), MOST_TEXELS)?,
+        Trimming::Alone => store_alone(read, MOST_TEXELS)?,
+        Trimming::Merged(options) => merge_bricks(read, &options)?.store(MOST_TEXELS)?,
+        Trimming::Packed => pack_bricks(read, MOST_TEXELS)?,
     })
 }
 
@@ -227,6 +224,8 @@ impl Held {
         (trimmed, grown, stored): (TrimmedBricks, TrimmedBricks, StoredBricks),
         before: Option<&Held>,
     ) -> (Held, Copied) {
+        let volume = &source.volume;
+        let coding = Coding::of(volume.scalar_type(), volume.rescale(), volume.range());
         let kept_chunk = |i: usize| {
             let held = before?;
             held.chunks[i].clone().filter(|_| held.stored.places()[i] == stored.places()[i])
@@ -236,7 +235,7 @@ impl Held {
             Some(match kept_chunk(i) {
                 Some(chunk) => (chunk, 0),
                 None => {
-                    let chunk = Arc::new(gather(source, &stored, i));
+                    let chunk = Arc::new(gather(volume, &coding, &stored, i));
                     let n_bytes = chunk.bytes().len();
                     (chunk, n_bytes)
                 }
@@ -249,9 +248,9 @@ impl Held {
         // A white brick's place is never read.
         let nowhere = Place::even(UVec3::ZERO, UVec3::ONE, Level(0), DVec3::ZERO);
         let places = stored.places().iter().map(|place| place.unwrap_or(nowhere)).collect();
-        let (format, decode) = coding(source);
         let places = Places::Table { texels: stored.texels().max(UVec3::ONE), places };
-        let slots = Slots::new(format, decode, places, chunks.clone()).expect("bricks fill their places");
+        let slots =
+            Slots::new(coding.format, coding.decode(), places, chunks.clone()).expect("bricks fill their places");
         let kept = KeptBoxes::new(kept_boxes(&trimmed));
         let (slots, kept, index) = match before {
             Some(held) => (slots.following(&held.slots), kept.following(&held.kept), held.index.clone()),
@@ -302,26 +301,15 @@ fn kept_boxes(trimmed: &TrimmedBricks) -> Vec<Aabb> {
     layout.bricks(Level(0)).map(of_brick).collect()
 }
 
-fn coding(source: &TrimmedVolume) -> (SampleFormat, Decode) {
-    let volume = &source.volume;
-    let range = volume.rescale().stored_range(volume.range());
-    let (format, stored) = SampleFormat::encoding(volume.voxels().scalar_type(), range);
-    (format, stored.rescaled(volume.rescale()))
-}
-
 /// A brick's stored samples in the order of the texture.
-fn gather(source: &TrimmedVolume, stored: &StoredBricks, ordinal: usize) -> Chunk {
-    let volume = &source.volume;
-    let scalar = volume.voxels().scalar_type();
+fn gather(volume: &Volume, coding: &Coding, stored: &StoredBricks, ordinal: usize) -> Chunk {
     let bytes = with_voxels!(volume.voxels(), voxels => {
         let samples = stored.samples(ordinal, voxels).expect("voxels of the volume");
-        let mut bytes = vec![0; samples.len() * scalar.n_bytes()];
+        let mut bytes = vec![0; samples.len() * volume.scalar_type().n_bytes()];
         Scalar::copy_le_bytes(&samples, &mut bytes);
         bytes
     });
-    let range = volume.rescale().stored_range(volume.range());
-    let (format, decode) = SampleFormat::encoding(scalar, range);
-    Chunk::new(encode(bytes, scalar, format, decode))
+    Chunk::new(coding.encode(bytes))
 }
 
 /// How many samples beside a visible one a frame reads: those of a gradient, and those at the other end of a segment.
@@ -337,8 +325,8 @@ fn reach_of(grid: &Grid, scene: &Scene) -> u32 {
 /// [`Skipping::Off`](crate::Skipping::Off) it is that of [`Trimming::Conventional`].
 ///
 /// # Errors
-/// As [`prepare`](crate::prepare()); options of merging that do not fit the bricks; bricks that do not fit a texture. Then the residency is
-/// as before.
+/// As [`prepare`](crate::prepare()); options of merging that do not fit the bricks; bricks that do not fit a texture: then the residency
+/// is as before.
 pub fn prepare_trimmed(
     source: &TrimmedVolume,
     scene: &Scene,
@@ -502,7 +490,12 @@ mod tests {
         assert!(3 * n_polygons(Trimming::Packed) < n_polygons(Trimming::Visible));
         let too_small = MergeOptions::of_bricks(BrickSide::S16);
         let wide = TrimmedVolume::new(volume(UVec3::new(61, 46, 31), 3), BrickSide::S32);
-        let refused = prepare_trimmed(&wide, &scene, Trimming::Merged(too_small), &mut TrimResidency::default());
+        let mut residency = TrimResidency::default();
+        let before = prepare_trimmed(&source, &scene, Trimming::Packed, &mut residency).unwrap();
+        let refused = prepare_trimmed(&wide, &scene, Trimming::Merged(too_small), &mut residency);
         assert!(refused.unwrap_err().to_string().starts_with("merging trimmed bricks: "));
+        // The bricks of another volume are still there.
+        let after = prepare_trimmed(&source, &scene, Trimming::Packed, &mut residency).unwrap();
+        assert!(Arc::ptr_eq(before.field().slots(), after.field().slots()));
     }
 }

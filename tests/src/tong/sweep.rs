@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use brickfield::trim::{DarkValues, Interpolation, MergeOptions, reclassify, trim_bricks};
+use brickfield::trim::{DarkValues, Interpolation, MergeOptions, TrimmedBricks, reclassify, trim_bricks};
 use brickfield::{TrimResidency, Trimming, prepare_trimmed};
 use brickfield_core::{Knot, TransferFunction, Volume};
 use serde::Serialize;
@@ -49,7 +49,7 @@ pub(super) fn run(args: &TongArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, P
         for (trimming, how) in ways {
             let mut residency = TrimResidency::default();
             let mut of_data = Vec::new();
-            let mut before: Option<brickfield::trim::TrimmedBricks> = None;
+            let mut before: Option<TrimmedBricks> = None;
             for i in 0..args.thresholds {
                 let (threshold, transfer) = at_threshold(&data_set.subject.volume, i, args.thresholds);
                 let classify_ms = classify(&data_set, &mut before, &transfer);
@@ -81,8 +81,8 @@ pub(super) fn run(args: &TongArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, P
     Ok(Vec::new())
 }
 
-/// The time of a classification, which is that of the frame before at first.
-fn classify(data: &DataSet, before: &mut Option<brickfield::trim::TrimmedBricks>, transfer: &TransferFunction) -> f64 {
+/// Milliseconds of a classification after that of the edit before.
+fn classify(data: &DataSet, before: &mut Option<TrimmedBricks>, transfer: &TransferFunction) -> f64 {
     let arrays = data.trimmed.arrays();
     let begin = Instant::now();
     let dark = DarkValues::of(transfer);

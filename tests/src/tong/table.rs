@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
-use brickfield::Scene;
 use brickfield::frame::Backend;
+use brickfield::{BackendKind, Scene};
 use brickfield_core::Image;
 use serde::Serialize;
 
@@ -57,7 +57,9 @@ pub(super) fn run(args: &TongArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, P
             let scene = data_set.scene(args, renderer, data_set.subject.transfer.clone())?;
             let prepared = prepared(args, &data_set, &scene)?;
             // The cpu casts rays to the samples of slices: nothing new.
-            let draws = |backend: &dyn Backend| renderer == Renderer::Rays || backend.describe().backend != "cpu";
+            let draws = |backend: &dyn Backend| {
+                renderer == Renderer::Rays || backend.describe().backend != BackendKind::Cpu.name()
+            };
             for backend in rivals.present.iter_mut().filter(|backend| draws(backend.as_ref())) {
                 let of_backend = contest(args, backend.as_mut(), &data_set, (renderer, &scene), &prepared)?;
                 print(HEADER)?;
