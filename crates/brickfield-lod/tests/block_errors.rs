@@ -124,6 +124,33 @@ fn one_sample_of_evenly_spread_values_is_estimated_to_a_fifth() {
 }
 
 #[test]
+fn a_peak_between_the_values_of_voxels_is_seen() {
+    // Nowhere is a voxel in the peak; between the two parts of a block every value is.
+    let parts: Field = |p| f64::from(u8::from(p.x % 8.0 >= 3.0));
+    let peak = |half: f64| transfer(&[(0.5 - half, 0.0, [1.0; 3]), (0.5, 4.0, [1.0; 3]), (0.5 + half, 0.0, [1.0; 3])]);
+    for half in [0.2, 0.02, 0.004] {
+        let of_blocks = estimated(parts, &layout(), &peak(half));
+        assert!(
+            of_blocks.iter().all(|errors| errors[1..4].iter().all(|error| *error > 0.5)),
+            "{half}: {:?}",
+            of_blocks[0]
+        );
+    }
+}
+
+#[test]
+fn a_peak_narrower_than_a_bin_is_estimated_to_a_third() {
+    // 512 values, evenly spread in a block.
+    let dense: Field = |p| ((p.x % 8.0) + (p.y % 8.0) / 8.0 + (p.z % 8.0) / 64.0) / 8.0;
+    for (center, half) in [(0.31, 0.02), (0.77, 0.01), (0.83, 0.005)] {
+        let peak = transfer(&[(center - half, 0.0, [1.0; 3]), (center, 4.0, [1.0; 3]), (center + half, 0.0, [1.0; 3])]);
+        let (estimate, exact) =
+            (estimated(dense, &layout(), &peak)[0], exact(dense, &layout(), &peak, Reconstruction::Constant)[0]);
+        assert!((estimate[3] / exact[3] - 1.0).abs() < 0.33, "{center} {half}: {estimate:?} {exact:?}");
+    }
+}
+
+#[test]
 fn what_cannot_be_told_apart_has_no_error() {
     let dark: Field = |p| 0.19 * (p.x / 64.0);
     let same: Field = |_| 0.7;

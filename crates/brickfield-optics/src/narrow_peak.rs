@@ -1,5 +1,8 @@
 //! Peaks of a transfer function that samples step over.
 
+use std::convert::Infallible;
+
+use brickfield_core::glam::UVec3;
 use brickfield_core::{Knot, TransferFunction, ValueRange, Volume};
 
 /// A peak of extinction that is narrower than the change of value from one sample to the next.
@@ -20,12 +23,39 @@ pub struct NarrowPeak {
 ///
 /// `step_voxels` is the distance between samples in voxels. Looks at no more than about four million voxels.
 pub fn narrow_peak(volume: &Volume, transfer: &TransferFunction, step_voxels: f64) -> Option<NarrowPeak> {
-    let stepped_over = peaks(transfer.knots()).into_iter().filter_map(|values| {
-        let change = step_voxels * median_change(volume, values)?;
-        (change > values.max - values.min).then_some(NarrowPeak { values, change })
-    });
-    let in_steps = |peak: &NarrowPeak| (peak.values.max - peak.values.min) / peak.change;
-    stepped_over.min_by(|a, b| in_steps(a).total_cmp(&in_steps(b)))
+    let changes = |middle| Ok::<_, Infallible>(volume_changes(volume, middle));
+    match narrow_peak_of(transfer, step_voxels, changes) {
+        Ok(narrow) => narrow,
+        Err(never) => match never {},
+    }
+}
+
+/// The same of voxels that are kept elsewhere: `changes` hands out how much neighbours differ that have a value between them.
+///
+/// # Errors
+/// The first error of `changes`.
+pub fn narrow_peak_of<E>(
+    transfer: &TransferFunction,
+    step_voxels: f64,
+    mut changes: impl FnMut(f64) -> Result<Vec<f64>, E>,
+) -> Result<Option<NarrowPeak>, E> {
+    let mut narrowest: Option<(f64, NarrowPeak)> = None;
+    for values in peaks(transfer.knots()) {
+        let Some(change) = median(changes(0.5 * values.min + 0.5 * values.max)?).map(|change| step_voxels * change)
+        else {
+            continue;
+        };
+        let n_steps = (values.max - values.min) / change;
+        if n_steps < narrowest.map_or(1.0, |(fewest, _)| fewest) {
+            narrowest = Some((n_steps, NarrowPeak { values, change }));
+        }
+    }
+    Ok(narrowest.map(|(_, peak)| peak))
+}
+
+/// How much neighbours along each axis differ that have `value` between them; of a box of `dims` values, x fastest.
+pub fn changes_across(values: &[f64], dims: UVec3, value: f64) -> Vec<f64> {
+    changes_in(dims, 0..dims.z as usize, |i| values[i], value)
 }
 
 /// The value ranges in which a peak has at least half its height. An extinction that does not fall again to half is no peak.
@@ -59,33 +89,48 @@ fn at_extinction(low: &Knot, high: &Knot, wanted: f64) -> f64 {
 /// Looks at every so many slices of larger volumes.
 const MAX_VOXELS: usize = 1 << 22;
 
-/// The median difference of neighbours with the middle of `values` between them; `None` if there are none.
-fn median_change(volume: &Volume, values: ValueRange) -> Option<f64> {
-    let dims = volume.grid().dims().to_array().map(|n| n as usize);
+/// [`changes_across`] a value of a volume.
+fn volume_changes(volume: &Volume, value: f64) -> Vec<f64> {
+    let dims = volume.grid().dims();
+    let slices = (0..dims.z as usize).step_by(volume.grid().n_voxels().div_ceil(MAX_VOXELS));
+    changes_in(dims, slices, |i| volume.value(i), value)
+}
+
+/// The changes from the voxels of some slices to their upper neighbours.
+fn changes_in(
+    dims: UVec3,
+    slices: impl Iterator<Item = usize>,
+    value_at: impl Fn(usize) -> f64,
+    value: f64,
+) -> Vec<f64> {
+    let dims = dims.to_array().map(|n| n as usize);
     let strides = [1, dims[0], dims[0] * dims[1]];
-    let middle = 0.5 * values.min + 0.5 * values.max;
     let mut changes = Vec::new();
-    for z in (0..dims[2]).step_by(volume.grid().n_voxels().div_ceil(MAX_VOXELS)) {
+    for z in slices {
         for i in z * strides[2]..(z + 1) * strides[2] {
             let at = [i % dims[0], i / dims[0] % dims[1], z];
-            let here = volume.value(i);
+            let here = value_at(i);
             for axis in (0..3).filter(|axis| at[*axis] + 1 < dims[*axis]) {
-                let there = volume.value(i + strides[axis]);
-                if here.min(there) <= middle && middle <= here.max(there) && here != there {
+                let there = value_at(i + strides[axis]);
+                if here.min(there) <= value && value <= here.max(there) && here != there {
                     changes.push((here - there).abs());
                 }
             }
         }
     }
-    let half = changes.len() / 2;
-    (!changes.is_empty()).then(|| *changes.select_nth_unstable_by(half, f64::total_cmp).1)
+    changes
+}
+
+fn median(mut numbers: Vec<f64>) -> Option<f64> {
+    let half = numbers.len() / 2;
+    (!numbers.is_empty()).then(|| *numbers.select_nth_unstable_by(half, f64::total_cmp).1)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use brickfield_core::Grid;
-    use brickfield_core::glam::{DVec3, UVec3};
+    use brickfield_core::glam::DVec3;
 
     fn transfer(knots: &[(f64, f64)]) -> TransferFunction {
         let knot = |(value, extinction): &(f64, f64)| Knot { value: *value, extinction: *extinction, color: [1.0; 3] };

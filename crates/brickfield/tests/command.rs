@@ -189,11 +189,23 @@ fn a_store_is_drawn_like_the_file_by_the_parts_that_its_blocks_need() {
         assert_eq!(out.status.code(), Some(0), "{words}: {}", text(&out.stderr));
         (image::open(place.path().join("b.png")).unwrap().to_rgb8().into_raw(), text(&out.stdout))
     };
-    for words in ["--block-level|0", "--block-level|1|--transfer|ramp", "--ratio|8", "--transfer|viridis|--ratio|20"] {
+    let peak = r##"{"knots": [{"value": 60, "extinction": 0, "srgb": "#ffffff"}, {"value": 61, "extinction": 4, "srgb": "#ff0000"},
+                             {"value": 62, "extinction": 0, "srgb": "#ffffff"}]}"##;
+    std::fs::write(place.path().join("peak.json"), peak).unwrap();
+    for words in [
+        "--block-level|0",
+        "--block-level|1|--transfer|ramp",
+        "--ratio|8",
+        "--transfer|viridis|--ratio|20",
+        "--block-level|0|--transfer|peak.json",
+    ] {
         let ((of_file, _), (of_store, said)) = (picture("a.nrrd", words), picture("a.zarr", words));
         assert_eq!(of_file, of_store, "{words}");
         assert!(said.contains("MiB of the store\nkept beside the blocks: "), "{said}");
     }
+    // The rule is chosen by the voxels of a few blocks.
+    let out = place.run(&format!("render|a.zarr|-o|b.png|{SMALL}|--blocks|8|--transfer|peak.json"));
+    assert!(text(&out.stderr).contains("--rule pre-integrated is taken"), "{}", text(&out.stderr));
     // Chunks that are lost or damaged are named, and no picture is left.
     std::fs::remove_file(place.path().join("b.png")).unwrap();
     let chunk = place.path().join("a.zarr/0/c/0/0/0");

@@ -8,7 +8,7 @@ use super::estimate::estimate;
 use super::slab::Slab;
 use super::table::ColorTable;
 
-/// The error of a block at each level, finest first: root mean square of Delta E over its voxels. Level 0 has none.
+/// The error of a block at each level, finest first, in Delta E; see [`BlockErrors`]. Level 0 has none.
 pub type LevelErrors = [f32; N_BLOCK_LEVELS];
 
 /// The visible error of every block at every level, estimated from summaries and a transfer function (Ljung, Lundstroem,
@@ -22,12 +22,23 @@ pub type LevelErrors = [f32; N_BLOCK_LEVELS];
 /// m + r (v - m) +- sqrt(variance r (1 - r))
 /// ```
 ///
-/// The error is the root mean square, over the block's histogram and both signs, of Delta E between C(v) and the colour that is
-/// shown. Two values stand for a bin, moved and stretched so that mean and variance of the block are kept. Departures from
-/// the papers: 1. theirs compare the histogram with that of a level, without `r` and the spread; 2. the slab's opacity enters.
+/// From the differences d between C(v) and the colour that is shown, over the block's histogram and both signs, the error is
+///
+/// ```text
+/// sqrt(|mean d|^2 + (mean |d|^2 - |mean d|^2) stride / side)
+/// ```
+///
+/// The mean is seen in full. The rest cancels along a ray: `stride` voxels of `side` differ alike, those of one sample. Without
+/// this factor a surface that a level displaces by half a sample would cost more than one that a level swallows.
+///
+/// Two to 16 values stand for a bin, as many as the narrowest peak of colours asks for, moved and stretched so that mean and
+/// variance of the block are kept. A bin without voxels counts for the values between them: a 16th of one voxel in `side`.
+/// Departures from the papers: 1. theirs compare the histogram with that of a level, without `r` and the spread; 2. the slab's
+/// opacity enters; 3. the factor above; 4. values between voxels.
 ///
 /// A block is transparent, of error 0, if the transfer function is 0 over its range. Colours are taken from a table of 4,096 steps
-/// over the range of all blocks, linear between: a peak narrower than a step may be missed.
+/// over the range of all blocks, linear between: a peak narrower than a step may be missed, and so may one that is narrower than
+/// a 256th of its block's range.
 #[derive(Clone, Debug)]
 pub struct BlockErrors {
     layout: BlockLayout,

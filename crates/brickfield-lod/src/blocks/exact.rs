@@ -1,10 +1,11 @@
 //! The visible error of blocks from all of their samples: slow, to judge estimates by.
 
-use brickfield_core::glam::UVec3;
+use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{BlockLayout, Level, N_BLOCK_LEVELS, TransferFunction};
 use rayon::prelude::*;
 
 use super::Slab;
+use super::differences::Differences;
 use super::errors::LevelErrors;
 
 /// How voxels are shown by a level's samples, within a block.
@@ -17,8 +18,8 @@ pub enum Reconstruction {
     Trilinear,
 }
 
-/// The error of every block at every level, by [`BlockLayout::ordinal`]: root mean square, over its voxels, of Delta E between
-/// the slab of a voxel and the slab of the value that is shown in its place.
+/// The error of every block at every level, by [`BlockLayout::ordinal`]: of the differences between the slab of a voxel and the
+/// slab of the value that is shown in its place, as much as [`BlockErrors`](super::BlockErrors) says is seen.
 ///
 /// `values` hands out the data values of a block's samples, x fastest; it is called from several threads at once. A
 /// conversion of colours per voxel and level.
@@ -42,17 +43,21 @@ pub fn exact_errors<E: Send>(
         for level in layout.side().levels().skip(1) {
             let samples = values(block, level)?;
             let shown = Shown::new(layout, block, level, reconstruction);
-            let squares = voxels.iter().zip(points(layout.extent(block)));
-            let squares = squares.map(|(voxel, p)| square_distance(*voxel, luv(shown.at(&samples, p))));
-            errors[usize::from(level.0)] = (squares.sum::<f64>() / voxels.len() as f64).sqrt() as f32;
+            let pairs = voxels.iter().zip(points(layout.extent(block)));
+            let pairs =
+                pairs.map(|(voxel, p)| DVec3::from_array(*voxel) - DVec3::from_array(luv(shown.at(&samples, p))));
+            errors[usize::from(level.0)] = differences(pairs, voxels.len()).seen(layout.side(), level) as f32;
         }
         Ok(errors)
     };
     (0..layout.n_blocks_total()).into_par_iter().map(of_block).collect()
 }
 
-fn square_distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
+fn differences(voxels: impl Iterator<Item = DVec3>, n: usize) -> Differences {
+    let add =
+        |(squares, sum): (f64, DVec3), difference: DVec3| (squares + difference.length_squared(), sum + difference);
+    let (squares, sum) = voxels.fold((0.0, DVec3::ZERO), add);
+    Differences { mean_square: squares / n as f64, square_of_mean: (sum / n as f64).length_squared() }
 }
 
 fn points(n: UVec3) -> impl Iterator<Item = UVec3> {
@@ -116,7 +121,6 @@ fn between(voxel: f64, [first, last]: [f64; 2], n: u32, level: Level) -> Pair {
 mod tests {
     use super::*;
     use brickfield_core::BlockSide;
-    use brickfield_core::glam::DVec3;
 
     #[test]
     fn linear_values_are_shown_exactly_between_the_outer_samples() {

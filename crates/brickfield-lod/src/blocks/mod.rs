@@ -1,6 +1,8 @@
 //! A level for every flat block: what a block's levels cost in visible error, and how a byte budget is spent on them.
 
+mod bumps;
 mod change;
+mod differences;
 mod errors;
 mod estimate;
 mod exact;

@@ -1,10 +1,11 @@
 //! The colours of all values, so that no block converts one.
 
 use brickfield_core::glam::Vec4;
-use brickfield_core::{TransferFunction, ValueRange};
+use brickfield_core::{Optics, TransferFunction, ValueRange};
 use rayon::prelude::*;
 
 use super::Slab;
+use super::bumps::Bumps;
 
 /// Cells of the table, evenly spaced between values: a power of two. Every value of 8 bits lies near a cell's end.
 const N_CELLS: usize = 4096;
@@ -25,6 +26,7 @@ pub(crate) struct ColorTable {
     scale: f64,
     /// Three components and 0, at both ends of every cell.
     luv: Box<[Vec4; N_CELLS + 1]>,
+    bumps: Bumps,
 }
 
 impl ColorTable {
@@ -36,7 +38,9 @@ impl ColorTable {
             *color = Vec4::new(l as f32, u as f32, v as f32, 0.0);
         });
         let scale = N_CELLS as f64 / (range.max - range.min);
-        ColorTable { range, scale: if scale.is_finite() { scale } else { 0.0 }, luv }
+        let [l, u, v] = slab.luv(Optics { extinction: 0.0, color: [0.0; 3] });
+        let bumps = Bumps::new(&luv[..], Vec4::new(l as f32, u as f32, v as f32, 0.0));
+        ColorTable { range, scale: if scale.is_finite() { scale } else { 0.0 }, luv, bumps }
     }
 
     /// The place of a value of the range: from 0 to the number of cells, which it does not reach.
@@ -52,6 +56,13 @@ impl ColorTable {
     /// The values of a cell.
     pub(crate) fn step(&self) -> f64 {
         (self.range.max - self.range.min) / N_CELLS as f64
+    }
+
+    /// Whether values `spacing` places apart, or closer, may step over a colour between two places; see [`Bumps`].
+    ///
+    /// The answer depends on the colours of these places alone.
+    pub(crate) fn has_bump(&self, first: f32, last: f32, spacing: f32) -> bool {
+        self.bumps.any(first, last, spacing)
     }
 
     /// The colour at a place; a place beyond the table has some colour.

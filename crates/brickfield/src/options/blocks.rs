@@ -13,9 +13,9 @@ use brickfield_lod::{
 };
 use clap::Args;
 
-use super::{InputOptions, OptionError, ViewOptions, values};
 #[cfg(feature = "formats")]
-use super::{note, progress_bar};
+use super::progress_bar;
+use super::{FinestVoxels, InputOptions, OptionError, ViewOptions, note, values};
 use crate::{BlockStyle, Classification, Scene, TransparentBlocks, companion_bytes};
 #[cfg(feature = "formats")]
 use crate::{StoreBlocks, StoreLimits, SummaryProgress};
@@ -29,10 +29,10 @@ pub struct BlockArgs {
     pub blocks: Option<BlockSide>,
     /// Bytes that the samples of all blocks and their spreads and gradients may take, in MiB: on the host, and on the device. Of an OME-Zarr, which is read in parts, a
     /// quarter of them is for unpacked chunks
-    #[arg(long, value_name = "MIB", requires = "blocks", conflicts_with_all = ["ratio", "block_level"], value_parser = values::positive)]
+    #[arg(long, value_name = "MIB", requires = "blocks", conflicts_with_all = ["ratio", "block_level"], value_parser = values::positive, allow_hyphen_values = true)]
     pub budget_mib: Option<f64>,
     /// The same as a ratio: 32 for a 32nd of the volume's bytes
-    #[arg(long, value_name = "N", requires = "blocks", conflicts_with = "block_level", value_parser = values::positive)]
+    #[arg(long, value_name = "N", requires = "blocks", conflicts_with = "block_level", value_parser = values::positive, allow_hyphen_values = true)]
     pub ratio: Option<f64>,
     /// One level for all blocks, whatever they show: 0 is the finest, and the one of all unless stated
     #[arg(long, value_name = "LEVEL", requires = "blocks")]
@@ -84,6 +84,15 @@ impl Blocks {
             Blocks::Memory(blocks) => blocks,
             #[cfg(feature = "formats")]
             Blocks::Store(blocks) => blocks.as_ref(),
+        }
+    }
+
+    /// Their voxels.
+    pub fn finest_voxels(&self) -> FinestVoxels<'_> {
+        match self {
+            Blocks::Memory(blocks) => FinestVoxels::Volume(blocks.volume()),
+            #[cfg(feature = "formats")]
+            Blocks::Store(blocks) => FinestVoxels::Blocks(blocks.as_ref()),
         }
     }
 
@@ -187,7 +196,11 @@ impl BlockArgs {
         let weights = (!self.any_view).then(|| block_weights(&layout, source.grid(), &view));
         let companion_bytes = companion_bytes(scene, self.classify);
         let budget = BlockBudget { size, scalar, companion_bytes, one_sample: OneSampleBlocks::Free };
-        Ok(select_block_levels(&layout, errors.levels(), weights.as_deref(), &budget)?)
+        let selection = select_block_levels(&layout, errors.levels(), weights.as_deref(), &budget)?;
+        if selection.n_bytes == 0 && selection.cost > 0.0 {
+            note(&"the budget buys no block more than one sample: every block is drawn as its mean");
+        }
+        Ok(selection)
     }
 
     /// Bytes of the budget that are not for blocks.

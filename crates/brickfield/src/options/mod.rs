@@ -2,6 +2,7 @@
 
 mod blocks;
 mod light;
+mod sampling;
 pub mod values;
 
 use std::path::{Path, PathBuf};
@@ -11,21 +12,21 @@ use brickfield_bricks::BlockSource;
 use brickfield_bricks::{BrickTree, BuildOptions, Downsampling, build_tree_observed};
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BlockSide, BrickSide, Grid, Level, LinearRgb, TransferFunction, Volume};
-use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
 use brickfield_io::{ChoiceKind, Limits, OpenError, OpenOptions, Opened, RawSpec, SliceSource, WorldFrame};
 use brickfield_lod::Criterion;
+use brickfield_optics::Preset;
 #[cfg(feature = "formats")]
 use brickfield_optics::diagonal_world;
-use brickfield_optics::{NarrowPeak, Preset, QuadratureRule, narrow_peak};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 pub use blocks::{BlockArgs, BlockSubject, Blocks};
 pub use light::LightOptions;
+pub use sampling::{FinestVoxels, SamplingOptions};
 
 #[cfg(feature = "formats")]
 use crate::StoreBlocks;
-use crate::{Quality, Scene, Skipping, Technique, Viewpoint};
+use crate::{Scene, Viewpoint};
 
 /// How a file is read.
 #[derive(Args, Clone, Debug)]
@@ -141,44 +142,6 @@ pub enum Boxes {
     All,
 }
 
-/// How rays are sampled.
-#[derive(Args, Clone, Debug)]
-pub struct SamplingOptions {
-    /// exact (f32 arithmetic, held to the reference) or fast (hardware filter, early end of rays)
-    #[arg(long, default_value = "exact", value_parser = values::mode)]
-    pub mode: Mode,
-    /// Distance between samples, in units of the least voxel spacing, as a decimal or a fraction
-    #[arg(long, value_name = "VOXELS", default_value_t = 0.5, value_parser = values::step, allow_hyphen_values = true)]
-    pub step: f64,
-    /// Quadrature rule: left-riemann, left-exponential, midpoint, pre-integrated or gauss2; midpoint unless stated, or
-    /// pre-integrated where samples would step over a peak of the transfer function (not of a store that is drawn as blocks, nor with --classify prefiltered)
-    #[arg(long, value_parser = values::rule)]
-    pub rule: Option<QuadratureRule>,
-    /// Surfaces between which samples lie: shells (spheres around the eye), tessellated-shells[=PIXELS] (their triangles:
-    /// squares of PIXELS, 16, cut in two), viewport-planes (parallel to the picture) or object-planes (of constant x, y or z);
-    /// shells unless stated, tessellated-shells with --polygons
-    #[arg(long, value_name = "SURFACES", value_parser = values::placement)]
-    pub placement: Option<Placement>,
-    /// What is divided into segments: rays (all are as long), or bricks (a ray's way through each, at distances that double
-    /// with its level); rays unless stated, bricks with --polygons
-    #[arg(long, value_name = "WHAT", value_parser = values::division)]
-    pub divide: Option<Division>,
-    /// For which length the light through a sample is computed: true (the segment's) or nominal (the step, whatever the
-    /// angle; with --rule midpoint)
-    #[arg(long, value_name = "WHICH", default_value = "true", value_parser = values::lengths)]
-    pub lengths: Lengths,
-    /// Rasterise and blend polygons instead of casting rays, into rgba32float or rgba16float; the cpu backend casts rays to
-    /// their samples
-    #[arg(long, value_name = "TARGET", value_parser = values::target)]
-    pub polygons: Option<Target>,
-    /// final, or draft (steps of twice the length, and of flat blocks the nearest one alone): while the camera moves
-    #[arg(long, value_name = "WHICH", default_value = "final", value_parser = values::quality)]
-    pub quality: Quality,
-    /// Upload and sample transparent bricks too (to measure what leaving them out saves)
-    #[arg(long)]
-    pub no_skip: bool,
-}
-
 /// A volume that is ready to be rendered.
 #[derive(Debug)]
 pub struct Subject {
@@ -205,6 +168,8 @@ pub enum OptionError {
     Blocks(#[from] brickfield_bricks::BlockBuildError),
     #[error(transparent)]
     BlockErrors(#[from] brickfield_lod::EstimateError),
+    #[error(transparent)]
+    Fetch(#[from] brickfield_bricks::FetchError),
     #[error("the blocks' budget: {0}")]
     Budget(#[from] brickfield_lod::BudgetError),
     #[error("--block-level {level}: blocks of {side} voxels have levels 0 to {most}")]
@@ -232,7 +197,7 @@ impl OptionError {
     pub fn is_usage(&self) -> bool {
         match self {
             OptionError::Open(_) | OptionError::Build(_) | OptionError::Preset(_) | OptionError::Transfer(_) => false,
-            OptionError::Blocks(_) | OptionError::BlockErrors(_) => false,
+            OptionError::Blocks(_) | OptionError::BlockErrors(_) | OptionError::Fetch(_) => false,
             OptionError::Budget(_)
             | OptionError::BlockLevel { .. }
             | OptionError::BlocksTooLarge { .. }
@@ -424,77 +389,6 @@ impl ViewOptions {
         }
         let scene = Scene::new(camera, self.size, transfer.clone());
         Ok(Scene { detail: self.lod.clone(), clip: self.clip, ..scene })
-    }
-}
-
-impl SamplingOptions {
-    /// The scene of a volume, sampled as asked for. The default rule depends on the volume, if it is in memory; of a store it is the
-    /// midpoint rule.
-    ///
-    /// # Errors
-    /// Options that exclude each other.
-    pub fn of(&self, scene: Scene, volume: Option<&Volume>) -> Result<Scene, OptionError> {
-        self.check()?;
-        let rule = self.rule.unwrap_or_else(|| self.default_rule(&scene, volume));
-        let tessellated = Placement::TessellatedShells { facet_pixels: values::FACET_PIXELS };
-        // Without polygons, as by default.
-        let (technique, placement, division) = match self.polygons {
-            Some(target) => (Technique::Polygons(target), tessellated, Division::Brick),
-            None => Default::default(),
-        };
-        Ok(Scene {
-            step_voxels: self.step,
-            rule,
-            mode: self.mode,
-            placement: self.placement.unwrap_or(placement),
-            division: self.divide.unwrap_or(division),
-            lengths: self.lengths,
-            technique,
-            quality: self.quality,
-            skipping: if self.no_skip { Skipping::Off } else { Skipping::On },
-            ..scene
-        })
-    }
-
-    /// The midpoint rule, unless it steps over a peak of the transfer function: then pre-integration, and that is said.
-    fn default_rule(&self, scene: &Scene, volume: Option<&Volume>) -> QuadratureRule {
-        let narrow = match self.lengths {
-            Lengths::True => volume.and_then(|volume| narrow_peak(volume, &scene.transfer, self.step)),
-            // Only the midpoint rule has nominal lengths.
-            Lengths::Nominal => None,
-        };
-        let Some(NarrowPeak { values, change }) = narrow else { return QuadratureRule::MidpointExponential };
-        note(&format!(
-            "the transfer function has a peak at {:.6} to {:.6}, and from one sample to the next values change by {change:.6}: \
-             --rule pre-integrated is taken, for the midpoint rule would show rings",
-            values.min, values.max
-        ));
-        QuadratureRule::PreIntegrated
-    }
-
-    /// Refuses what is wrong for any volume: `prepare` does, too, but here the options are known by name.
-    ///
-    /// # Errors
-    /// Options that exclude each other.
-    pub fn check(&self) -> Result<(), OptionError> {
-        let exclude = |first: String, second: String, reason| Err(OptionError::Exclude { first, second, reason });
-        let polygons = || format!("--polygons {}", self.polygons.map_or("", Target::name));
-        match (self.polygons, self.placement, self.divide, self.lengths, self.rule) {
-            (Some(_), Some(Placement::Shells), ..) => exclude(
-                polygons(),
-                "--placement shells".to_owned(),
-                "a sphere has no polygons; take tessellated-shells",
-            ),
-            (Some(_), _, Some(Division::Ray), ..) => {
-                exclude(polygons(), "--divide rays".to_owned(), "polygons are clipped to bricks")
-            }
-            (.., Lengths::Nominal, Some(rule)) if rule != QuadratureRule::MidpointExponential => exclude(
-                "--lengths nominal".to_owned(),
-                format!("--rule {}", rule.name()),
-                "the one node must be the segment's middle; take --rule midpoint",
-            ),
-            _ => Ok(()),
-        }
     }
 }
 

@@ -13,7 +13,7 @@ use brickfield::lod::{BlockLevels, Criterion, select_cut};
 use brickfield::optics::Normals;
 #[cfg(feature = "formats")]
 use brickfield::options::Blocks;
-use brickfield::options::{BlockSubject, Boxes, OptionError, Subject, values};
+use brickfield::options::{BlockSubject, Boxes, FinestVoxels, OptionError, Subject, values};
 use brickfield::overlay::{LevelColor, show_bricks, show_bricks_faintly};
 use brickfield::{
     BackendError, BackendKind, BlockResidency, Classification, Residency, Scene, Technique, TrimResidency,
@@ -37,7 +37,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         return render_trimmed(args, trimming, backend.as_mut());
     }
     let subject = Subject::open(&args.file, &args.input, &args.tree, &args.view)?;
-    let scene = args.sampling.of(args.view.scene(&subject)?, Some(&subject.volume))?;
+    let scene = args.sampling.of(args.view.scene(&subject)?, Some(FinestVoxels::Volume(&subject.volume)))?;
     let scene = args.light.of(scene, subject.volume.range(), subject.tree.grid())?;
     let mut residency = Residency::default();
     let plan = prepare(&subject.tree, &scene, &mut residency).map_err(Failure::usage)?;
@@ -102,8 +102,8 @@ fn render_blocks(args: &RenderArgs, side: BlockSide, backend: &mut dyn Backend) 
     let source = subject.blocks.source();
     let scene = args.view.scene_of(source.grid(), subject.frame, &subject.transfer)?;
     // Prefiltered samples know of peaks between them; pre-integration would know nothing of spreads.
-    let volume = subject.blocks.volume().filter(|_| args.flat.classify == Classification::OfMean);
-    let scene = args.sampling.of(scene, volume)?;
+    let voxels = (args.flat.classify == Classification::OfMean).then(|| subject.blocks.finest_voxels());
+    let scene = args.sampling.of(scene, voxels)?;
     let scene = args.light.of(scene, source.range(), source.grid())?;
     let selection = args.flat.select(&subject, &scene)?;
     let (levels, mut residency) = (&selection.levels, BlockResidency::default());
@@ -126,7 +126,7 @@ fn render_trimmed(args: &RenderArgs, trimming: Trimming, backend: &mut dyn Backe
     let (volume, frame, transfer) = args.input.open_to_render(&args.file, &args.view)?;
     let source = TrimmedVolume::new(Arc::new(volume), args.tree.brick);
     let (volume, grid) = (source.volume(), source.volume().grid());
-    let scene = args.sampling.of(args.view.scene_of(grid, frame, &transfer)?, Some(volume))?;
+    let scene = args.sampling.of(args.view.scene_of(grid, frame, &transfer)?, Some(FinestVoxels::Volume(volume)))?;
     let scene = args.light.of(scene, volume.range(), grid)?;
     let mut residency = TrimResidency::default();
     let plan = prepare_trimmed(&source, &scene, trimming, &mut residency).map_err(Failure::usage)?;
