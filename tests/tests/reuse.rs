@@ -7,7 +7,7 @@ use brickfield::core::{BrickSide, Camera, Grid, Knot, Projection, TransferFuncti
 use brickfield::frame::{
     Backend, Chunk, DarkRegions, Decode, Drawing, Evaluate, Feature, Field, Frame, FramePlan, IndexEntry, IndexGrid,
     IndexLattice, Join, MacrocellRanges, Mode, Occupancy, Places, PlanParts, QuadratureRule, RayFrame, Reach,
-    SampleFormat, Sampling, ShaderFunction, Slots, Steps,
+    SampleFormat, Sampling, Sequence, ShaderFunction, Slots, Steps,
 };
 use brickfield_ash::{AshBackend, ConnectError, Options, Validation};
 use brickfield_wgpu::{AdapterChoice, OpenError, WgpuBackend};
@@ -136,6 +136,7 @@ fn parts(bricks: &[Option<Brick>]) -> PlanParts {
         lighting: None,
         dark: DarkRegions::default(),
         drawing: Drawing::Rays,
+        sequence: Sequence::Whole,
     }
 }
 

@@ -104,8 +104,18 @@ fn steps() -> Result<Vec<Step>> {
     let of_tong = ["--paper", "tong", "--check=pictures", "--require", "wgpu,ash"];
     let counts = [&of_tong[..], &["--part", "counts"]].concat();
     steps.push(step("claims of Tong, Wang, Tsang and Tang 1999", move || checked("compare", &counts).run()));
-    let rows =
-        ["--part", "merge,table,sweep", "--only", "engine", "--size", "64x64", "--frames", "1", "--thresholds", "5"];
+    let rows = [
+        "--part",
+        "merge,table,sweep,batches",
+        "--only",
+        "engine",
+        "--size",
+        "64x64",
+        "--frames",
+        "1",
+        "--thresholds",
+        "5",
+    ];
     let table = [&of_tong[..], &rows].concat();
     steps.push(step_with_data("rows of Tong's table", move || checked("compare", &table).run()));
     Ok(steps)

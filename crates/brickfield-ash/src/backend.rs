@@ -4,11 +4,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use brickfield_core::Image as Picture;
+use brickfield_core::glam::UVec2;
 use brickfield_frame::{
     Backend, Capabilities, Description, Evaluate, Frame, FramePlan, ProxyGeometry, RenderError, Resource,
-    ShaderFunction, Target, Timing, check_memory,
+    ShaderFunction, Target, Timing, check_batch, check_memory,
 };
-use brickfield_shaders::{Entry, ShaderLibrary, Variant, passes, pixels_per_pass};
+use brickfield_shaders::{Entry, ShaderLibrary, Variant, n_rays_that_go_on, passes};
 
 use crate::march::{RenderTime, march, milliseconds_since, read_back, reserve_picture};
 use crate::options::choose;
@@ -74,14 +75,15 @@ impl AshBackend {
         self.device.instance().log().clone()
     }
 
-    fn replay(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
+    /// Casts the rays of a batch into the picture; how long it took, and the bytes that were brought to the device.
+    fn replay(&mut self, plan: &FramePlan, is_first: bool) -> Result<(Timing, u64), RenderError> {
         let started = Instant::now();
         let pipeline = self.variants.pipeline(&self.device, Variant::of(plan, Entry::March))?;
         let Brought { uniforms, n_bytes } = self.resources.bring(&mut self.queue, &mut self.staging, plan, pipeline)?;
         let picture = reserve_picture(&mut self.picture, &self.device, plan.size())?;
         let group_height = pipeline.workgroup_size()[1];
         if pipeline.uses(Resource::SeenBefore) {
-            self.resources.reserve_rays(pixels_per_pass(plan, group_height))?;
+            self.resources.reserve_rays(n_rays_that_go_on(plan, group_height))?;
         }
         let resources = &self.resources;
         let bound = pipeline.bind(|binding| match binding.resource {
@@ -90,15 +92,18 @@ impl AshBackend {
         })?;
         let upload_ms = milliseconds_since(started);
         let target = resources.buffer(Resource::Frame).ok_or_else(|| missing(Resource::Frame))?;
-        let time = march(&mut self.queue, &bound, picture, (target, uniforms), &passes(plan, group_height))?;
-        let marched = Instant::now();
-        let image = read_back(&mut self.queue, &mut self.staging, picture, (Target::Float32, Use::ShaderWrite))?;
-        let read_back_ms = milliseconds_since(marched);
-        Ok(Frame::new(image, timing(upload_ms, &time, read_back_ms)).with_upload(n_bytes))
+        let passes = passes(plan, group_height, is_first);
+        let time = march(&mut self.queue, &bound, picture, (target, uniforms), &passes)?;
+        Ok((timing(upload_ms, &time), n_bytes))
     }
 
     /// As [`replay`](Self::replay), by rasterising polygons.
-    fn rasterise(&mut self, plan: &FramePlan, proxy: &Arc<ProxyGeometry>) -> Result<Frame, RenderError> {
+    fn rasterise(
+        &mut self,
+        plan: &FramePlan,
+        proxy: &Arc<ProxyGeometry>,
+        is_first: bool,
+    ) -> Result<(Timing, u64), RenderError> {
         let (started, target) = (Instant::now(), proxy.target());
         let canvas = reserve_canvas(&mut self.canvas, &self.device, target, plan.size())?;
         let variant = Variant::of(plan, Entry::Proxy(proxy.slices()));
@@ -108,18 +113,31 @@ impl AshBackend {
         let resources = &self.resources;
         let bound = pipeline.bind(|binding| resources.bindable(binding))?;
         let upload_ms = milliseconds_since(started);
-        let time = self.polygons.draw(&mut self.queue, &bound, canvas, proxy)?;
-        let drawn = Instant::now();
-        let image = read_back(&mut self.queue, &mut self.staging, &canvas.image, (target, Use::Canvas))?;
-        let read_back_ms = milliseconds_since(drawn);
-        let frame = Frame::new(image, timing(upload_ms, &time, read_back_ms));
-        Ok(frame.with_upload(brought.n_bytes + of_polygons))
+        let time = self.polygons.draw(&mut self.queue, &bound, canvas, proxy, is_first)?;
+        Ok((timing(upload_ms, &time), brought.n_bytes + of_polygons))
+    }
+
+    /// Brings back what the plans so far have made, the last of them this way.
+    fn bring_back(&mut self, drawn: Drawn) -> Result<Picture<f32>, RenderError> {
+        let (image, from) = match drawn {
+            Drawn::Rays => (self.picture.as_ref(), (Target::Float32, Use::ShaderWrite)),
+            Drawn::Polygons(target) => (self.canvas.as_ref().map(|canvas| &canvas.image), (target, Use::Canvas)),
+        };
+        let image = image.ok_or_else(|| missing(Resource::Picture))?;
+        read_back(&mut self.queue, &mut self.staging, image, from)
     }
 }
 
-fn timing(upload_ms: f64, time: &RenderTime, read_back_ms: f64) -> Timing {
+/// How a picture was made.
+#[derive(Clone, Copy)]
+enum Drawn {
+    Rays,
+    Polygons(Target),
+}
+
+fn timing(upload_ms: f64, time: &RenderTime) -> Timing {
     let mut timing = Timing::of_rendering(time.wall_ms);
-    (timing.upload_ms, timing.device_ms, timing.read_back_ms) = (upload_ms, time.device_ms, read_back_ms);
+    (timing.upload_ms, timing.device_ms) = (upload_ms, time.device_ms);
     timing
 }
 
@@ -132,19 +150,36 @@ impl Backend for AshBackend {
         self.validation_log().messages()
     }
 
-    fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
-        let (size, limit) = (plan.size(), self.description.capabilities.max_image);
+    fn render_batches(
+        &mut self,
+        size: UVec2,
+        batches: &mut dyn Iterator<Item = FramePlan>,
+    ) -> Result<Frame, RenderError> {
+        let limit = self.description.capabilities.max_image;
         if size.max_element() > limit {
             return Err(RenderError::ImageTooLarge { size, limit });
         }
         check_memory(size)?;
-        if plan.shows_nothing() {
-            return Ok(Frame::new(Picture::transparent(size), Timing::default()));
+        let (mut timing, mut n_bytes, mut drawn) = (Timing::default(), 0, None);
+        for plan in batches {
+            check_batch(&plan, size)?;
+            if plan.shows_nothing() {
+                continue;
+            }
+            let is_first = drawn.is_none();
+            let (of_batch, brought) = match plan.proxy() {
+                Some(proxy) => self.rasterise(&plan, proxy, is_first)?,
+                None => self.replay(&plan, is_first)?,
+            };
+            timing = if is_first { of_batch } else { timing.and(&of_batch) };
+            n_bytes += brought;
+            drawn = Some(plan.proxy().map_or(Drawn::Rays, |proxy| Drawn::Polygons(proxy.target())));
         }
-        match plan.proxy() {
-            Some(proxy) => self.rasterise(plan, proxy),
-            None => self.replay(plan),
-        }
+        let Some(drawn) = drawn else { return Ok(Frame::new(Picture::transparent(size), timing)) };
+        let started = Instant::now();
+        let image = self.bring_back(drawn)?;
+        timing.read_back_ms = milliseconds_since(started);
+        Ok(Frame::new(image, timing).with_upload(n_bytes))
     }
 
     fn as_evaluate(&mut self) -> Option<&mut dyn Evaluate> {

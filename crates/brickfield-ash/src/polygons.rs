@@ -55,19 +55,22 @@ impl Polygons {
         Ok((corners.len() + indices.len()) as u64)
     }
 
-    /// Clears a canvas and draws the polygons into it, batch by batch.
+    /// Draws the polygons into a canvas, which may be cleared before, run by run.
     pub(crate) fn draw(
         &self,
         queue: &mut Queue,
         bound: &BoundPipeline<'_>,
         canvas: &Canvas,
         proxy: &ProxyGeometry,
+        clears: bool,
     ) -> Result<RenderTime, RenderError> {
         let started = Instant::now();
         let mut device_ms = queue.run_timed("clearing the picture", |recorder| {
-            recorder.image_barrier(&canvas.image, Use::Nothing, Use::CopyTarget);
-            recorder.clear(&canvas.image);
-            recorder.image_barrier(&canvas.image, Use::CopyTarget, Use::Canvas);
+            if clears {
+                recorder.image_barrier(&canvas.image, Use::Nothing, Use::CopyTarget);
+                recorder.clear(&canvas.image);
+                recorder.image_barrier(&canvas.image, Use::CopyTarget, Use::Canvas);
+            }
             // Resources were brought to the device for compute shaders.
             recorder.barrier(Use::ShaderRead, Use::DrawRead);
         })?;

@@ -21,7 +21,24 @@ pub trait Backend: Send {
     ///
     /// # Errors
     /// A request beyond a limit of the device: the amount that was asked for, and the limit.
-    fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError>;
+    fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
+        self.render_batches(plan.size(), &mut std::iter::once(plan.clone()))
+    }
+
+    /// Renders a frame of `size` pixels in batches, so that the device holds the bricks of one batch at a time; a batch is asked for
+    /// when the one before it is drawn.
+    ///
+    /// Several plans are [`Batch`](crate::Sequence)es of one picture: along every ray the bricks of a batch lie behind those of
+    /// earlier ones where rays are cast, and before them where polygons are blended. In exact mode the picture is that of one
+    /// batch, bit by bit.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render); a plan of another size.
+    fn render_batches(
+        &mut self,
+        size: UVec2,
+        batches: &mut dyn Iterator<Item = FramePlan>,
+    ) -> Result<Frame, RenderError>;
 
     /// The backend as one that evaluates single functions, if it is.
     fn as_evaluate(&mut self) -> Option<&mut dyn Evaluate> {
@@ -131,6 +148,17 @@ pub struct Timing {
 }
 
 impl Timing {
+    /// One after the other. A device time is known if both are.
+    #[must_use]
+    pub fn and(&self, next: &Timing) -> Timing {
+        Timing {
+            upload_ms: self.upload_ms + next.upload_ms,
+            device_ms: self.device_ms.zip(next.device_ms).map(|(a, b)| a + b),
+            wall_ms: self.wall_ms + next.wall_ms,
+            read_back_ms: self.read_back_ms + next.read_back_ms,
+        }
+    }
+
     /// Rendering alone, as the caller waits for it.
     pub fn of_rendering(wall_ms: f64) -> Timing {
         Timing { wall_ms, ..Timing::default() }
@@ -196,6 +224,8 @@ impl ShaderFunction {
 #[non_exhaustive]
 #[allow(missing_docs)]
 pub enum RenderError {
+    #[error("a batch of {} x {} pixels in a frame of {} x {}", batch.x, batch.y, size.x, size.y)]
+    BatchSize { batch: UVec2, size: UVec2 },
     #[error("a picture of {} x {} pixels is beyond the device's limit of {limit} a side", size.x, size.y)]
     ImageTooLarge { size: UVec2, limit: u32 },
     #[error("{n_bricks} bricks of {side}^3 samples do not fit a 3-D texture of at most {limit} texels a side")]
@@ -218,6 +248,17 @@ pub enum RenderError {
     Driver { call: &'static str, code: String },
     #[error("shader variant: {message}")]
     Shader { message: String },
+}
+
+/// Whether a batch is of a frame of `size` pixels.
+///
+/// # Errors
+/// If its picture has another size.
+pub fn check_batch(plan: &FramePlan, size: UVec2) -> Result<(), RenderError> {
+    match plan.size() == size {
+        true => Ok(()),
+        false => Err(RenderError::BatchSize { batch: plan.size(), size }),
+    }
 }
 
 /// Whether the host has memory for a picture.

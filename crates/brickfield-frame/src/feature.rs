@@ -12,6 +12,8 @@ pub enum Feature {
     SkipEmpty,
     /// Parts of slots are known to be dark, macrocells or all that lies beside a box: rays leap over them.
     SkipDark,
+    /// Some slots are lent to a batch: their values are read, and their segments left out.
+    Lent,
     /// Tiles of the picture have beams: rays leave out the segments that their beam passes over.
     SkipBesideBeams,
     /// Some slots are coarser than level 0.
@@ -32,11 +34,12 @@ pub enum Feature {
 
 impl Feature {
     /// All features.
-    pub const ALL: [Feature; 12] = [
+    pub const ALL: [Feature; 13] = [
         Feature::HardwareFilter,
         Feature::EarlyTermination,
         Feature::SkipEmpty,
         Feature::SkipDark,
+        Feature::Lent,
         Feature::SkipBesideBeams,
         Feature::MultiLevel,
         Feature::ShortBlocks,
@@ -54,6 +57,7 @@ impl Feature {
             Feature::EarlyTermination => "early_termination",
             Feature::SkipEmpty => "skip_empty",
             Feature::SkipDark => "skip_dark",
+            Feature::Lent => "lent",
             Feature::SkipBesideBeams => "skip_beside_beams",
             Feature::MultiLevel => "multi_level",
             Feature::ShortBlocks => "short_blocks",

@@ -22,7 +22,7 @@ mod value_scale;
 
 pub use adapter::AdapterKind;
 pub use backend::{
-    Backend, Capabilities, Description, Evaluate, Frame, RenderError, ShaderFunction, Timing, check_memory,
+    Backend, Capabilities, Description, Evaluate, Frame, RenderError, ShaderFunction, Timing, check_batch, check_memory,
 };
 pub use brickfield_optics::QuadratureRule;
 pub use content::{Chunk, Chunked, ContentId, HeldChunks};
@@ -33,7 +33,7 @@ pub use field::{
 };
 pub use lighting::{LightUniform, Lighting};
 pub use pass::Pass;
-pub use plan::{Drawing, FramePlan, PlanError, PlanParts};
+pub use plan::{Drawing, FramePlan, PlanError, PlanParts, Sequence};
 pub use probe::{Fetch, Probe, ProbeUniforms, TextureReads, TextureWork};
 pub use proxy::{ProxyCorner, ProxyGeometry, Slices, Target};
 pub use rays::{PlanRay, RayFrame};

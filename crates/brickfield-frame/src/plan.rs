@@ -28,6 +28,7 @@ pub struct FramePlan {
     pub(crate) kept: Option<Arc<KeptBoxes>>,
     pub(crate) beams: Option<Arc<Beams>>,
     pub(crate) proxy: Option<Arc<ProxyGeometry>>,
+    pub(crate) sequence: Sequence,
     pub(crate) features: FeatureSet,
 }
 
@@ -50,6 +51,22 @@ pub struct PlanParts {
     pub dark: DarkRegions,
     /// How backends that can do both make the picture.
     pub drawing: Drawing,
+    /// Whether the plan is a whole frame or one batch of it; by default a whole one.
+    pub sequence: Sequence,
+}
+
+/// Whether a plan is a whole frame, or one of several batches of a frame ([`Backend::render_batches`](crate::Backend::render_batches)).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Sequence {
+    /// A whole frame: rays begin with nothing seen.
+    #[default]
+    Whole,
+    /// A batch: rays go on with what they have seen in earlier ones, polygons are blended over those of earlier ones.
+    Batch {
+        /// A box in sample space around everything visible in any batch: rays that are divided brick by brick enter their first brick
+        /// there, in each batch at the same point.
+        visible: Aabb,
+    },
 }
 
 impl PlanParts {
@@ -61,8 +78,8 @@ impl PlanParts {
         sampling: Sampling,
         transfer: TransferFunction,
     ) -> PlanParts {
-        let (lighting, dark, drawing) = (None, DarkRegions::default(), Drawing::Rays);
-        PlanParts { field, rays, domain, sampling, transfer, lighting, dark, drawing }
+        let (lighting, dark, drawing, sequence) = (None, DarkRegions::default(), Drawing::Rays, Sequence::Whole);
+        PlanParts { field, rays, domain, sampling, transfer, lighting, dark, drawing, sequence }
     }
 }
 
@@ -120,8 +137,11 @@ impl FramePlan {
     /// are not resident.
     pub fn new(parts: PlanParts) -> Result<FramePlan, PlanError> {
         check(&parts)?;
-        let PlanParts { field, rays, domain, sampling, transfer, lighting, dark, drawing } = parts;
-        let visible = visible_box(&field, &domain);
+        let PlanParts { field, rays, domain, sampling, transfer, lighting, dark, drawing, sequence } = parts;
+        let visible = match sequence {
+            Sequence::Batch { visible } if sampling.division() == Division::Brick => visible.intersection(&domain),
+            _ => visible_box(&field, &domain),
+        };
         let mut plan = FramePlan {
             field,
             rays,
@@ -134,6 +154,7 @@ impl FramePlan {
             kept: dark.kept().cloned(),
             beams: None,
             proxy: None,
+            sequence,
             features: FeatureSet::default(),
         };
         match drawing {
@@ -163,6 +184,7 @@ impl FramePlan {
             (Feature::EarlyTermination, self.sampling.transmittance_floor() > 0.0),
             (Feature::SkipEmpty, self.field.index().has_empty()),
             (Feature::SkipDark, self.occupancy.is_some() || (self.kept.is_some() && self.proxy.is_none())),
+            (Feature::Lent, self.proxy.is_none() && self.has_lent()),
             (Feature::SkipBesideBeams, self.beams.is_some()),
             (Feature::MultiLevel, self.field.has_coarse()),
             (Feature::ShortBlocks, self.field.has_short_blocks()),
@@ -246,6 +268,25 @@ impl FramePlan {
     #[inline]
     pub fn proxy(&self) -> Option<&Arc<ProxyGeometry>> {
         self.proxy.as_ref()
+    }
+
+    /// Whether the plan is one of several batches of a frame.
+    #[inline]
+    pub fn is_batch(&self) -> bool {
+        matches!(self.sequence, Sequence::Batch { .. })
+    }
+
+    /// Whether any block is lent.
+    #[inline]
+    pub fn has_lent(&self) -> bool {
+        self.kept.as_ref().is_some_and(|kept| kept.has_lent())
+    }
+
+    /// Whether the segments that begin in the block of an index cell are another batch's.
+    #[inline]
+    pub fn is_lent(&self, cell: UVec3) -> bool {
+        let slot = self.field.index().at(cell).slot();
+        self.kept.as_ref().zip(slot).is_some_and(|(kept, slot)| kept.is_lent(slot))
     }
 
     /// The features that the frame needs of a shader.

@@ -7,7 +7,7 @@ use brickfield_core::{Aabb, Companion, TransferFunction};
 
 use crate::{
     Beams, BlockRanges, Feature, FeatureSet, Field, FramePlan, IndexGrid, Join, KeptBoxes, Lighting, Occupancy,
-    Overview, ProxyGeometry, RayFrame, Sampling, Slots,
+    Overview, ProxyGeometry, RayFrame, Sampling, Sequence, Slots,
 };
 
 /// A plan taken apart. It is put together again without validation: the plan may be wrong in any way.
@@ -30,6 +30,7 @@ pub struct SpoiltPlan {
     pub kept: Option<Arc<KeptBoxes>>,
     pub proxy: Option<Arc<ProxyGeometry>>,
     pub features: FeatureSet,
+    sequence: Sequence,
     has_beams: bool,
 }
 
@@ -48,6 +49,7 @@ impl SpoiltPlan {
             kept,
             beams,
             proxy,
+            sequence,
             features,
         } = plan.clone();
         SpoiltPlan {
@@ -67,6 +69,7 @@ impl SpoiltPlan {
             kept,
             proxy,
             features,
+            sequence,
             has_beams: beams.is_some(),
         }
     }
@@ -81,7 +84,18 @@ impl SpoiltPlan {
     pub fn into_plan(self) -> FramePlan {
         let field = self.field();
         let SpoiltPlan {
-            rays, domain, visible, sampling, transfer, lighting, occupancy, kept, proxy, features, ..
+            rays,
+            domain,
+            visible,
+            sampling,
+            transfer,
+            lighting,
+            occupancy,
+            kept,
+            proxy,
+            features,
+            sequence,
+            ..
         } = self;
         let features = features.without(Feature::SkipBesideBeams);
         let mut plan = FramePlan {
@@ -96,6 +110,7 @@ impl SpoiltPlan {
             kept,
             beams: None,
             proxy,
+            sequence,
             features,
         };
         if let (true, Some(side)) = (self.has_beams, plan.field.slots().brick_side()) {

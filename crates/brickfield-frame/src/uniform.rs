@@ -95,8 +95,10 @@ pub struct FrameUniforms {
     pub facet_pixels: u32,
     /// Squares of facets in a row of the picture.
     pub facet_columns: u32,
-    /// Nothing.
-    pub padding_4: [u32; 2],
+    /// Whether rays go on with what they have seen before: 1, else 0.
+    pub goes_on: u32,
+    /// Rows of the picture from the first one in the list of what rays have seen to the first of the pass.
+    pub seen_row: u32,
 }
 
 /// A transfer function's knot.
@@ -181,7 +183,8 @@ impl FrameUniforms {
             spread_scale: plan.spreads().map_or(0.0, |slots| (slots.decode().scale / plan.value_scale().unit()) as f32),
             padding_2: 0.0,
             padding_3: 0.0,
-            padding_4: [0; 2],
+            goes_on: 0,
+            seen_row: 0,
         }
         .in_pass(&whole)
     }
@@ -192,6 +195,8 @@ impl FrameUniforms {
         self.first_segment = pass.segments.start;
         self.end_segment = pass.segments.end;
         self.first_row = pass.rows.start;
+        self.goes_on = u32::from(pass.goes_on);
+        self.seen_row = pass.rows.start - pass.first_seen_row;
         self
     }
 }

@@ -9,7 +9,7 @@ mod variant;
 
 pub use evaluate::{shader_inputs, shader_outputs};
 pub use library::{PatchError, ShaderLibrary};
-pub use passes::{passes, pixels_per_pass};
+pub use passes::{n_rays_that_go_on, passes};
 pub use reflect::{Binding, BindingKind};
 pub use specialise::{Counts, ShaderError, Specialised, specialise};
 pub use variant::{Entry, FieldKind, KnotSearch, Segments, Surfaces, Variant};

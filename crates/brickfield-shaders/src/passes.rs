@@ -12,17 +12,28 @@ const MOST_SEGMENTS: f64 = 8192.0;
 /// Most values of the field in one dispatch: about a second on a slow device, whose driver may end a longer dispatch.
 const MOST_VALUES: f64 = (1u32 << 28) as f64;
 
-/// The dispatches of a plan's frame, in order; rows are cut at multiples of `group_height`.
-pub fn passes(plan: &FramePlan, group_height: u32) -> Vec<Pass> {
+/// The dispatches of a plan's frame, in order; rows are cut at multiples of `group_height`. Those of a batch go on with what rays have
+/// seen, unless it is the first.
+pub fn passes(plan: &FramePlan, group_height: u32, is_first_batch: bool) -> Vec<Pass> {
     let (height, n_rows) = (plan.size().y, rows_per_pass(plan, group_height));
     let ranges = segment_ranges(plan);
     let bands = (0..height).step_by(n_rows as usize).map(|first| first..height.min(first + n_rows));
-    bands.flat_map(|rows| ranges.iter().map(move |s| Pass { rows: rows.clone(), segments: s.clone() })).collect()
+    let of_band = |rows: std::ops::Range<u32>| {
+        let pass = move |(i, segments): (usize, &std::ops::Range<f32>)| Pass {
+            segments: segments.clone(),
+            first_seen_row: if plan.is_batch() { 0 } else { rows.start },
+            goes_on: i > 0 || !is_first_batch,
+            rows: rows.clone(),
+        };
+        ranges.iter().enumerate().map(pass)
+    };
+    bands.flat_map(of_band).collect()
 }
 
-/// Most pixels in any pass of a plan.
-pub fn pixels_per_pass(plan: &FramePlan, group_height: u32) -> u64 {
-    u64::from(rows_per_pass(plan, group_height).min(plan.size().y)) * u64::from(plan.size().x)
+/// How many rays must remember what they have seen: of a batch all, of a whole frame those of one pass.
+pub fn n_rays_that_go_on(plan: &FramePlan, group_height: u32) -> u64 {
+    let rows = rows_per_pass(plan, group_height).min(plan.size().y);
+    u64::from(if plan.is_batch() { plan.size().y } else { rows }) * u64::from(plan.size().x)
 }
 
 /// Whether rays need several passes.

@@ -26,6 +26,8 @@ pub struct Variant {
     pub search: KnotSearch,
     /// Rays are too long for one pass ([`crate::passes`]), and go on where earlier passes ended.
     pub long_rays: bool,
+    /// Whether rays go on with what they have seen in an earlier pass or batch.
+    pub rays_go_on: bool,
     /// Texture reads of 16-bit samples are turned back into integers, of which f32 keeps all digits.
     pub integer_samples: bool,
     /// The entry point.
@@ -251,6 +253,7 @@ impl Variant {
             segments: Segments::default(),
             search: KnotSearch::Unrolled(2),
             long_rays: false,
+            rays_go_on: false,
             integer_samples: false,
             entry,
         }
@@ -265,6 +268,7 @@ impl Variant {
             segments: Segments::of(plan),
             search: KnotSearch::of(plan),
             long_rays: entry == Entry::March && has_long_rays(plan),
+            rays_go_on: entry == Entry::March && (plan.is_batch() || has_long_rays(plan)),
             integer_samples: plan.reads_integers(),
             entry,
         }
@@ -303,7 +307,11 @@ impl Variant {
     /// The conditions (`@if(name)`) that hold.
     pub(crate) fn conditions(self) -> Vec<(String, bool)> {
         let has = |f| self.features.contains(f);
-        let holds = |f| has(f) && (f != Feature::Prefiltered || self.is_prefiltered());
+        let holds = |f| match f {
+            Feature::Prefiltered => has(f) && self.is_prefiltered(),
+            Feature::Lent => has(f) && self.field == FieldKind::Placed,
+            _ => has(f),
+        };
         let features = Feature::ALL.into_iter().map(|f| (f.name().to_owned(), holds(f)));
         let rules = QuadratureRule::ALL.into_iter().map(|r| (condition_of_rule(r), r == self.rule));
         let evaluated = |f| self.entry == Entry::Evaluate(f);
@@ -320,6 +328,7 @@ impl Variant {
             ("dense", self.field == FieldKind::Dense),
             ("flat_blocks", matches!(self.field, FieldKind::Blocks(_) | FieldKind::Dense)),
             ("long_rays", self.long_rays),
+            ("rays_go_on", self.rays_go_on),
             ("integer_samples", self.integer_samples),
         ];
         let derived = derived.into_iter().map(|(name, holds)| (name.to_owned(), holds));

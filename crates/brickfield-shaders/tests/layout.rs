@@ -93,7 +93,9 @@ fn assert_rows() {
         first_row,
         beam_pixels,
         facet_pixels,
-        facet_columns
+        facet_columns,
+        goes_on,
+        seen_row
     );
     let offset = |name: &str| match name {
         "facets_of_picture" => offset_of!(FrameUniforms, facet_pixels),
@@ -102,7 +104,7 @@ fn assert_rows() {
     let library = brickfield_shaders::ShaderLibrary::embedded();
     let (_, text) = library.modules().find(|(name, _)| *name == "frame").unwrap();
     let functions: Vec<&str> = text.split("\nfn ").skip(1).collect();
-    assert_eq!(functions.len(), 20);
+    assert_eq!(functions.len(), 22);
     for function in functions {
         let name = function.split('(').next().unwrap();
         let read = function.split("return frame.").nth(1).unwrap().split(';').next().unwrap();

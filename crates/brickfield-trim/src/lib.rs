@@ -6,6 +6,7 @@ mod dark;
 mod keep;
 mod merge;
 mod pack;
+mod pages;
 mod slices;
 mod stored;
 
@@ -19,5 +20,6 @@ pub use merge::{
     BetweenClusters, ChunkPart, FirstMerge, MergeError, MergeOptions, MergedBricks, TextureChunk, merge_bricks,
 };
 pub use pack::{PackError, PackedBoxes, pack_boxes};
+pub use pages::{PagedBrick, PagedBricks};
 pub use slices::{BoxError, MinMaxArrays, SampleBox};
-pub use stored::{StoredBricks, TexelAccount, VoxelsError, pack_bricks, store_alone};
+pub use stored::{StoredBricks, TexelAccount, VoxelsError, pack_bricks, samples_of, store_alone};

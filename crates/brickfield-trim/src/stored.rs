@@ -53,6 +53,11 @@ pub struct VoxelsError {
 /// # Errors
 /// If the boxes have no room; a box's index is that among the bricks that are not white.
 pub fn pack_bricks(trimmed: &TrimmedBricks, most: UVec3) -> Result<StoredBricks, PackError> {
+    pack_parts(*trimmed.layout(), &packed_parts(trimmed), most)
+}
+
+/// The kept boxes, each with its longest side first.
+pub(crate) fn packed_parts(trimmed: &TrimmedBricks) -> Vec<Option<Part>> {
     let longest_first = |n: UVec3| {
         let falls = |axes: &Axes| {
             let n = axes.of_texture().map(|axis| n[axis]);
@@ -60,12 +65,8 @@ pub fn pack_bricks(trimmed: &TrimmedBricks, most: UVec3) -> Result<StoredBricks,
         };
         Axes::ALL.into_iter().find(falls).unwrap_or_default()
     };
-    let parts: Vec<Option<Part>> = trimmed
-        .kept()
-        .iter()
-        .map(|kept| (!kept.is_empty()).then(|| Part { samples: *kept, axes: longest_first(kept.n) }))
-        .collect();
-    pack_parts(*trimmed.layout(), &parts, most)
+    let part = |kept: &SampleBox| (!kept.is_empty()).then(|| Part { samples: *kept, axes: longest_first(kept.n) });
+    trimmed.kept().iter().map(part).collect()
 }
 
 /// Trims each brick along its trimming axis, which becomes the texture's z, and stores it on its own: bricks before they are merged.
@@ -73,8 +74,12 @@ pub fn pack_bricks(trimmed: &TrimmedBricks, most: UVec3) -> Result<StoredBricks,
 /// # Errors
 /// As [`pack_bricks`].
 pub fn store_alone(trimmed: &TrimmedBricks, most: UVec3) -> Result<StoredBricks, PackError> {
-    let parts: Vec<Option<Part>> = trimmed.layout().bricks(Level(0)).map(|id| alone(trimmed, id)).collect();
-    pack_parts(*trimmed.layout(), &parts, most)
+    pack_parts(*trimmed.layout(), &alone_parts(trimmed), most)
+}
+
+/// What is stored of each brick that is trimmed along one axis.
+pub(crate) fn alone_parts(trimmed: &TrimmedBricks) -> Vec<Option<Part>> {
+    trimmed.layout().bricks(Level(0)).map(|id| alone(trimmed, id)).collect()
 }
 
 fn pack_parts(layout: BrickLayout, parts: &[Option<Part>], most: UVec3) -> Result<StoredBricks, PackError> {
@@ -100,6 +105,37 @@ impl Part {
     }
 }
 
+/// The place of a brick's part that begins at a texel.
+pub(crate) fn placed_part(layout: &BrickLayout, id: BrickId, part: &Part, texel: UVec3) -> Place {
+    let first = brick_samples(layout, id).first + part.samples.first;
+    let even = Place::even(texel, part.samples.n, Level(0), first.as_dvec3());
+    Place { n: part.n(), axes: part.axes, ..even }
+}
+
+/// The samples of a place of level 0 in the order of the texture, x of the texture fastest, from the voxels of a volume of `dims`, x
+/// fastest.
+///
+/// # Errors
+/// If the voxels do not fill the volume.
+///
+/// # Panics
+/// If the place reaches beyond the volume.
+pub fn samples_of<T: Copy>(place: &Place, dims: UVec3, voxels: &[T]) -> Result<Vec<T>, VoxelsError> {
+    let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
+    if voxels.len() != nx * ny * nz {
+        return Err(VoxelsError { n_voxels: voxels.len(), dims });
+    }
+    let strides = [1, nx, nx * ny];
+    let [i, j, k] = place.axes.of_texture().map(|axis| strides[axis]);
+    let first = place.first.as_uvec3().to_array().into_iter().zip(strides).map(|(p, s)| p as usize * s).sum::<usize>();
+    let [ni, nj, nk] = place.n.to_array().map(|n| n as usize);
+    let mut samples = Vec::with_capacity(place.n_samples());
+    for row in (0..nj * nk).map(|row| first + row % nj * j + row / nj * k) {
+        samples.extend((0..ni).map(|x| voxels[row + x * i]));
+    }
+    Ok(samples)
+}
+
 impl StoredBricks {
     /// `part` has, for each brick that is stored, its part and the first texel of it.
     pub(crate) fn new(
@@ -109,11 +145,13 @@ impl StoredBricks {
     ) -> StoredBricks {
         let place = |id: BrickId| {
             let (part, texel) = part(layout.ordinal(id))?;
-            let first = brick_samples(&layout, id).first + part.samples.first;
-            let even = Place::even(texel, part.samples.n, Level(0), first.as_dvec3());
-            Some(Place { n: part.n(), axes: part.axes, ..even })
+            Some(placed_part(&layout, id, &part, texel))
         };
         StoredBricks { layout, texels, places: layout.bricks(Level(0)).map(place).collect() }
+    }
+
+    pub(crate) fn of_places(layout: BrickLayout, texels: UVec3, places: Vec<Option<Place>>) -> StoredBricks {
+        StoredBricks { layout, texels, places }
     }
 
     /// Which bricks there are.
@@ -131,8 +169,7 @@ impl StoredBricks {
         &self.places
     }
 
-    /// The samples of a brick in the order of the texture, x of the texture fastest, from the voxels of the volume, x fastest; none of a
-    /// white brick.
+    /// The samples of a brick in the order of the texture ([`samples_of`]); none of a white brick.
     ///
     /// # Errors
     /// If the voxels do not fill the volume.
@@ -140,22 +177,10 @@ impl StoredBricks {
     /// # Panics
     /// If the layout has no such brick.
     pub fn samples<T: Copy>(&self, ordinal: usize, voxels: &[T]) -> Result<Vec<T>, VoxelsError> {
-        let dims = self.layout.dims();
-        let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
-        if voxels.len() != nx * ny * nz {
-            return Err(VoxelsError { n_voxels: voxels.len(), dims });
+        match &self.places[ordinal] {
+            Some(place) => samples_of(place, self.layout.dims(), voxels),
+            None => Ok(Vec::new()),
         }
-        let Some(place) = &self.places[ordinal] else { return Ok(Vec::new()) };
-        let strides = [1, nx, nx * ny];
-        let [i, j, k] = place.axes.of_texture().map(|axis| strides[axis]);
-        let first =
-            place.first.as_uvec3().to_array().into_iter().zip(strides).map(|(p, s)| p as usize * s).sum::<usize>();
-        let [ni, nj, nk] = place.n.to_array().map(|n| n as usize);
-        let mut samples = Vec::with_capacity(place.n_samples());
-        for row in (0..nj * nk).map(|row| first + row % nj * j + row / nj * k) {
-            samples.extend((0..ni).map(|x| voxels[row + x * i]));
-        }
-        Ok(samples)
     }
 
     /// Texels, and those among them that hold a sample. A box is a brick's.

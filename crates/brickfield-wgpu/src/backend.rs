@@ -6,9 +6,9 @@ use brickfield_core::Image;
 use brickfield_core::glam::UVec2;
 use brickfield_frame::{
     Backend, Description, Evaluate, Feature, Frame, FramePlan, FrameUniforms, RenderError, Resource, SampleFormat,
-    ShaderFunction, Target, Timing, check_memory,
+    ShaderFunction, Target, Timing, check_batch, check_memory,
 };
-use brickfield_shaders::{Entry, ShaderLibrary, Variant, passes, pixels_per_pass, shader_inputs, shader_outputs};
+use brickfield_shaders::{Entry, ShaderLibrary, Variant, n_rays_that_go_on, passes, shader_inputs, shader_outputs};
 use wgpu::{BufferUsages, Features};
 
 use crate::buffer::Reused;
@@ -16,7 +16,7 @@ use crate::clock::{Clock, milliseconds_since};
 use crate::device::Device;
 use crate::picture::{self, Maker};
 use crate::pipeline::{Pipeline, Pipelines, Program};
-use crate::polygons::Polygons;
+use crate::polygons::{Drawing, Polygons};
 use crate::resources::{Brought, Resources, missing};
 use crate::{AdapterChoice, OpenError, adapter};
 
@@ -96,16 +96,21 @@ impl WgpuBackend {
     }
 
     /// Runs the march over the picture, pass by pass; device and wall time in milliseconds.
-    fn march(&mut self, plan: &FramePlan, uniforms: FrameUniforms) -> Result<(Option<f64>, f64), RenderError> {
+    fn march(
+        &mut self,
+        plan: &FramePlan,
+        uniforms: FrameUniforms,
+        is_first_batch: bool,
+    ) -> Result<(Option<f64>, f64), RenderError> {
         let pipeline = self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?;
         let [x, y, _] = pipeline.workgroup_size;
         if pipeline.uses(Resource::SeenBefore) {
-            let n_bytes = pixels_per_pass(plan, y) * size_of::<[f32; 4]>() as u64;
+            let n_bytes = n_rays_that_go_on(plan, y) * size_of::<[f32; 4]>() as u64;
             self.resources.buffer(Resource::SeenBefore).reserve(&self.device, n_bytes)?;
         }
         let clock = self.clock.as_ref();
         let (mut device_ms, mut wall_ms) = (clock.map(|_| 0.0), 0.0);
-        for pass in passes(plan, y) {
+        for pass in passes(plan, y, is_first_batch) {
             let started = Instant::now();
             let groups = [plan.size().x.div_ceil(x), (pass.rows.len() as u32).div_ceil(y), 1];
             let uniforms = uniforms.in_pass(&pass);
@@ -135,13 +140,41 @@ impl Backend for WgpuBackend {
         &self.device.description
     }
 
-    fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
-        let size = plan.size();
+    fn render_batches(
+        &mut self,
+        size: UVec2,
+        batches: &mut dyn Iterator<Item = FramePlan>,
+    ) -> Result<Frame, RenderError> {
         self.check_size(size)?;
         check_memory(size)?;
-        if plan.shows_nothing() {
-            return Ok(Frame::new(Image::transparent(size), Timing::default()));
+        let (mut timing, mut n_bytes, mut is_first) = (Timing::default(), 0, true);
+        for plan in batches {
+            check_batch(&plan, size)?;
+            if plan.shows_nothing() {
+                continue;
+            }
+            let (of_batch, brought) = self.draw(&plan, is_first)?;
+            timing = if is_first { of_batch } else { timing.and(&of_batch) };
+            (n_bytes, is_first) = (n_bytes + brought, false);
         }
+        if is_first {
+            return Ok(Frame::new(Image::transparent(size), timing));
+        }
+        let started = Instant::now();
+        let picture = self.resources.picture.as_ref().ok_or_else(|| missing(Resource::Picture))?;
+        let image = picture.read(&self.device, &mut self.staging)?;
+        timing.read_back_ms = milliseconds_since(started);
+        Ok(Frame::new(image, timing).with_upload(n_bytes))
+    }
+
+    fn as_evaluate(&mut self) -> Option<&mut dyn Evaluate> {
+        Some(self)
+    }
+}
+
+impl WgpuBackend {
+    /// Draws a batch, over those before it; how long it took, and the bytes that were brought to the device.
+    fn draw(&mut self, plan: &FramePlan, is_first: bool) -> Result<(Timing, u64), RenderError> {
         self.check_features(plan)?;
         self.check_blending(plan)?;
         let started = Instant::now();
@@ -154,7 +187,7 @@ impl Backend for WgpuBackend {
             }
         };
         let Brought { uniforms, mut n_bytes } = self.resources.bring(&self.device, plan, pipeline)?;
-        self.resources.resize(&self.device, size, maker)?;
+        self.resources.resize(&self.device, plan.size(), maker)?;
         if let Some(proxy) = plan.proxy() {
             n_bytes += self.polygons.bring(&self.device, proxy)?;
         }
@@ -162,20 +195,16 @@ impl Backend for WgpuBackend {
         self.device.wait("uploading")?;
         let upload_ms = milliseconds_since(started);
         let (device_ms, wall_ms) = match plan.proxy() {
-            None => self.march(plan, uniforms)?,
-            Some(proxy) => self.polygons.draw(&self.device, pipeline, &self.resources, proxy, self.clock.as_ref())?,
+            None => self.march(plan, uniforms, is_first)?,
+            Some(proxy) => {
+                let drawing =
+                    Drawing { device: &self.device, pipeline, resources: &self.resources, clock: self.clock.as_ref() };
+                self.polygons.draw(&drawing, proxy, is_first)?
+            }
         };
-        let started = Instant::now();
-        let picture = self.resources.picture.as_ref().ok_or_else(|| missing(Resource::Picture))?;
-        let image = picture.read(&self.device, &mut self.staging)?;
         let mut timing = Timing::of_rendering(wall_ms);
         (timing.upload_ms, timing.device_ms) = (upload_ms, device_ms);
-        timing.read_back_ms = milliseconds_since(started);
-        Ok(Frame::new(image, timing).with_upload(n_bytes))
-    }
-
-    fn as_evaluate(&mut self) -> Option<&mut dyn Evaluate> {
-        Some(self)
+        Ok((timing, n_bytes))
     }
 }
 

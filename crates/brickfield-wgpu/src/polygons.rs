@@ -18,6 +18,14 @@ pub(crate) struct Polygons {
     indices: Reused,
 }
 
+/// What polygons are drawn by and into.
+pub(crate) struct Drawing<'a> {
+    pub(crate) device: &'a Device,
+    pub(crate) pipeline: &'a Pipeline,
+    pub(crate) resources: &'a Resources,
+    pub(crate) clock: Option<&'a Clock>,
+}
+
 impl Polygons {
     pub(crate) fn new() -> Polygons {
         Polygons {
@@ -39,24 +47,23 @@ impl Polygons {
         Ok(corners + indices)
     }
 
-    /// Draws them into the picture, batch by batch; device and wall time in milliseconds.
+    /// Draws them into the picture, which may be cleared before, run by run; device and wall time in milliseconds.
     pub(crate) fn draw(
         &self,
-        device: &Device,
-        pipeline: &Pipeline,
-        resources: &Resources,
+        drawing: &Drawing<'_>,
         proxy: &ProxyGeometry,
-        clock: Option<&Clock>,
+        clears: bool,
     ) -> Result<(Option<f64>, f64), RenderError> {
-        let (mut device_ms, started) = (clock.map(|_| 0.0), Instant::now());
+        let (mut device_ms, started) = (drawing.clock.map(|_| 0.0), Instant::now());
         let nothing = 0..0;
         // Without a batch there is still a picture to be cleared.
         let batches = if proxy.batches().is_empty() { std::slice::from_ref(&nothing) } else { proxy.batches() };
         for (i, batch) in batches.iter().enumerate() {
-            let load = if i == 0 { wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT) } else { wgpu::LoadOp::Load };
-            self.draw_batch(device, pipeline, resources, (batch.clone(), load), clock)?;
-            device.wait("rendering")?;
-            let batch_ms = clock.map(|c| c.milliseconds(device)).transpose()?;
+            let load =
+                if i == 0 && clears { wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT) } else { wgpu::LoadOp::Load };
+            self.draw_batch(drawing, batch.clone(), load)?;
+            drawing.device.wait("rendering")?;
+            let batch_ms = drawing.clock.map(|c| c.milliseconds(drawing.device)).transpose()?;
             device_ms = device_ms.zip(batch_ms).map(|(sum, ms)| sum + ms);
         }
         Ok((device_ms, milliseconds_since(started)))
@@ -64,12 +71,11 @@ impl Polygons {
 
     fn draw_batch(
         &self,
-        device: &Device,
-        pipeline: &Pipeline,
-        resources: &Resources,
-        (batch, load): (std::ops::Range<u32>, wgpu::LoadOp<wgpu::Color>),
-        clock: Option<&Clock>,
+        drawing: &Drawing<'_>,
+        batch: std::ops::Range<u32>,
+        load: wgpu::LoadOp<wgpu::Color>,
     ) -> Result<(), RenderError> {
+        let Drawing { device, pipeline, resources, clock } = *drawing;
         let bound = resources.bind(device, pipeline)?;
         let (corners, indices) = (self.corners.buffer(), self.indices.buffer());
         let (Program::Polygons(program), Some(picture), Some(corners), Some(indices)) =

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod backends;
+mod batches;
 mod block_residency;
 mod blocks;
 mod course;
@@ -23,6 +24,9 @@ pub mod options;
 pub mod overlay;
 
 pub use backends::{AdapterInfo, BackendError, BackendKind, BackendStatus, Validation, backends, open_backend};
+pub use batches::{
+    CacheCounts, CacheError, CacheOptions, Eviction, TrimBatches, TrimCache, prepare_trimmed_batches, render_ahead,
+};
 pub use block_residency::BlockResidency;
 pub use blocks::{BlockStyle, Classification, PrepareBlocksError, TransparentBlocks, companion_bytes, prepare_blocks};
 pub use brickfield_bricks as bricks;

@@ -12,7 +12,8 @@ use brickfield_frame::{
 use brickfield_lod::back_to_front;
 use brickfield_trim::{
     BrickArrays, ClassCounts, DarkValues, Interpolation, MergeError, MergeOptions, PackError, StoredBricks,
-    TexelAccount, TrimmedBricks, brick_samples, merge_bricks, pack_bricks, reclassify, store_alone, trim_bricks,
+    TexelAccount, TrimmedBricks, brick_samples, merge_bricks, pack_bricks, reclassify, samples_of, store_alone,
+    trim_bricks,
 };
 use rayon::prelude::*;
 
@@ -20,7 +21,7 @@ use crate::block_residency::MAX_TEXELS;
 use crate::course::{Course, to_sample_space, voxels_in_step};
 use crate::encode::Coding;
 use crate::prepare::{check_polygons, check_size, check_values};
-use crate::{Copied, PrepareError, Scene, Skipping, Technique};
+use crate::{CacheError, Copied, PrepareError, Scene, Skipping, Technique};
 
 /// A volume whose bricks of level 0 are classified slice by slice (Tong, Wang, Tsang and Tang 1999, section 3.2.1).
 #[derive(Debug)]
@@ -53,6 +54,10 @@ impl TrimmedVolume {
 
     fn grid(&self) -> &Grid {
         self.volume.grid()
+    }
+
+    pub(crate) fn id(&self) -> SourceId {
+        self.id
     }
 }
 
@@ -90,8 +95,16 @@ impl Trimming {
         })
     }
 
+    /// Whole bricks where nothing is to be left out.
+    pub(crate) fn unless_off(self, skipping: Skipping) -> Trimming {
+        match skipping {
+            Skipping::On => self,
+            Skipping::Off => Trimming::Conventional,
+        }
+    }
+
     /// Whether the boxes of bricks are drawn, and not the whole bricks.
-    fn draws_boxes(self) -> bool {
+    pub(crate) fn draws_boxes(self) -> bool {
         !matches!(self, Trimming::Conventional | Trimming::Visible)
     }
 }
@@ -107,6 +120,8 @@ pub enum PrepareTrimmedError {
     Merge(#[from] MergeError),
     #[error("storing trimmed bricks: {0}")]
     Pack(#[from] PackError),
+    #[error("drawing trimmed bricks in batches: {0}")]
+    Cache(#[from] CacheError),
 }
 
 impl From<PlanError> for PrepareTrimmedError {
@@ -231,11 +246,11 @@ impl Held {
             held.chunks[i].clone().filter(|_| held.stored.places()[i] == stored.places()[i])
         };
         let chunk = |(i, place): (usize, &Option<Place>)| {
-            place.as_ref()?;
+            let place = place.as_ref()?;
             Some(match kept_chunk(i) {
                 Some(chunk) => (chunk, 0),
                 None => {
-                    let chunk = Arc::new(gather(volume, &coding, &stored, i));
+                    let chunk = Arc::new(gather(volume, &coding, place));
                     let n_bytes = chunk.bytes().len();
                     (chunk, n_bytes)
                 }
@@ -282,7 +297,7 @@ impl Held {
 }
 
 /// The boxes around what may be seen of each brick, in sample space.
-fn kept_boxes(trimmed: &TrimmedBricks) -> Vec<Aabb> {
+pub(crate) fn kept_boxes(trimmed: &TrimmedBricks) -> Vec<Aabb> {
     let layout = trimmed.layout();
     let last = layout.dims() - 1;
     let of_brick = |id: BrickId| {
@@ -302,9 +317,9 @@ fn kept_boxes(trimmed: &TrimmedBricks) -> Vec<Aabb> {
 }
 
 /// A brick's stored samples in the order of the texture.
-fn gather(volume: &Volume, coding: &Coding, stored: &StoredBricks, ordinal: usize) -> Chunk {
+pub(crate) fn gather(volume: &Volume, coding: &Coding, place: &Place) -> Chunk {
     let bytes = with_voxels!(volume.voxels(), voxels => {
-        let samples = stored.samples(ordinal, voxels).expect("voxels of the volume");
+        let samples = samples_of(place, volume.grid().dims(), voxels).expect("voxels of the volume");
         let mut bytes = vec![0; samples.len() * volume.scalar_type().n_bytes()];
         Scalar::copy_le_bytes(&samples, &mut bytes);
         bytes
@@ -313,7 +328,7 @@ fn gather(volume: &Volume, coding: &Coding, stored: &StoredBricks, ordinal: usiz
 }
 
 /// How many samples beside a visible one a frame reads: those of a gradient, and those at the other end of a segment.
-fn reach_of(grid: &Grid, scene: &Scene) -> u32 {
+pub(crate) fn reach_of(grid: &Grid, scene: &Scene) -> u32 {
     let of_light = u32::from(scene.light.is_some());
     match scene.rule {
         QuadratureRule::PreIntegrated => of_light + voxels_in_step(grid, scene),
@@ -333,10 +348,7 @@ pub fn prepare_trimmed(
     trimming: Trimming,
     residency: &mut TrimResidency,
 ) -> Result<FramePlan, PrepareTrimmedError> {
-    let trimming = match scene.skipping {
-        Skipping::On => trimming,
-        Skipping::Off => Trimming::Conventional,
-    };
+    let trimming = trimming.unless_off(scene.skipping);
     check_size(scene.size)?;
     check_values(source.volume.range())?;
     let (layout, grid) = (*source.layout(), source.grid());

@@ -325,6 +325,11 @@ fn trimmed_bricks_are_the_same_picture() {
     }
     let said = place.rendered("a.png", "|--brick|16|--trim|packed");
     assert!(said.contains("bricks of 16: 0 white, 1 grey, 0 black\nkept 0.0 of 0.0 MiB"), "{said}");
+    let in_batches = "|--brick|16|--trim|visible|--cache-mib|0.005";
+    assert_eq!(place.pixels(in_batches), whole);
+    assert!(
+        place.rendered("a.png", in_batches).contains("1 batch(es), of which the last is above; 1 pages, 1 brought")
+    );
 }
 
 #[test]

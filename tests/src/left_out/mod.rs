@@ -125,6 +125,7 @@ fn general(plan: &FramePlan) -> FramePlan {
     let is_allowed = |feature: &Feature| match feature {
         Feature::SkipEmpty | Feature::MultiLevel | Feature::TransferLookup => true,
         Feature::ShortBlocks => is_of_blocks,
+        Feature::Lent => plan.kept().is_some(),
         Feature::HardwareFilter
         | Feature::EarlyTermination
         | Feature::SkipDark

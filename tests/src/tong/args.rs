@@ -24,6 +24,9 @@ pub struct TongArgs {
     /// Thresholds of the part `sweep`
     #[arg(long, default_value_t = 33, value_parser = clap::value_parser!(u32).range(2..=1000))]
     pub thresholds: u32,
+    /// Voxels along a side of the generated volume of the part `batches`
+    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(32..=1024))]
+    pub volume_side: u32,
 }
 
 /// The parts of a run.
@@ -37,6 +40,8 @@ pub enum Part {
     Table,
     /// A threshold that runs over its range: bricks that change, time and bytes
     Sweep,
+    /// Caches smaller than the bricks that a view shows
+    Batches,
     /// Peaks of memory
     Memory,
 }
@@ -49,6 +54,7 @@ impl Part {
             Part::Merge => "Merging: chunks and padding",
             Part::Table => "Table 1: algorithms",
             Part::Sweep => "Edits of the threshold",
+            Part::Batches => "Frames in batches",
             Part::Memory => "Memory",
         }
     }

@@ -1,12 +1,13 @@
 //! The volumes that are rendered, and their scenes.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use brickfield::bricks::{BrickTree, BuildOptions, build_tree};
 use brickfield::frame::{Division, Mode, Placement, Target};
 use brickfield::trim::DarkValues;
 use brickfield::{Scene, Technique, TrimmedVolume, Viewpoint};
-use brickfield_core::{Scalar, TransferFunction, ValueRange, with_voxels};
+use brickfield_core::{BrickSide, Scalar, TransferFunction, ValueRange, with_voxels};
 use rayon::prelude::*;
 
 use super::TongArgs;
@@ -31,11 +32,25 @@ pub(super) fn check_data(args: &TongArgs) -> Result<(), PaperError> {
 /// The volumes that are asked for, one by one.
 pub(super) fn data_sets(args: &TongArgs) -> Result<impl Iterator<Item = Result<DataSet, PaperError>>, PaperError> {
     let side = args.side;
-    Ok(args.common.named(&DATA)?.into_iter().map(move |(name, path)| {
-        let subject = Subject::of_file(name, &path)?;
-        let tree = build_tree(&subject.volume, &BuildOptions { side, ..BuildOptions::default() })?;
-        Ok(DataSet { trimmed: TrimmedVolume::new(Arc::clone(&subject.volume), side), tree, subject })
-    }))
+    let of_file = move |(name, path): (String, PathBuf)| of_subject(side, Subject::of_file(name, &path)?);
+    Ok(args.common.named(&DATA)?.into_iter().map(of_file))
+}
+
+/// The volumes of the part `batches`: one of the data sets and a generated one, or those that are asked for.
+pub(super) fn data_sets_of_batches(
+    args: &TongArgs,
+) -> Result<impl Iterator<Item = Result<DataSet, PaperError>>, PaperError> {
+    let is_own = args.common.files.is_empty() && args.common.only.is_none();
+    let (side, volume_side) = (args.side, args.volume_side);
+    let named = args.common.named(if is_own { &DATA[DATA.len() - 1..] } else { &DATA })?;
+    let of_file = move |(name, path): (String, PathBuf)| of_subject(side, Subject::of_file(name, &path)?);
+    let generated = is_own.then_some(()).into_iter().map(move |()| of_subject(side, Subject::of_phantom(volume_side)));
+    Ok(named.into_iter().map(of_file).chain(generated))
+}
+
+fn of_subject(side: BrickSide, subject: Subject) -> Result<DataSet, PaperError> {
+    let tree = build_tree(&subject.volume, &BuildOptions { side, ..BuildOptions::default() })?;
+    Ok(DataSet { trimmed: TrimmedVolume::new(Arc::clone(&subject.volume), side), tree, subject })
 }
 
 /// How samples are drawn.

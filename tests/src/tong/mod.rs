@@ -3,10 +3,11 @@
 //!
 //! - `counts`: blocks by equation 1. `merge`: chunks and padding of every way to store trimmed bricks.
 //! - `table`: samples, bytes, times and savings of algorithms I to IV and of their alternatives, on every backend.
-//! - `sweep`: a threshold that runs over its range. `memory`: peaks on the host and the device.
+//! - `sweep`: a threshold that runs over its range. `batches`: caches smaller than a view's bricks, and an orbit. `memory`: peaks on the host and the device.
 
 mod algorithm;
 mod args;
+mod batches;
 mod counts;
 mod data;
 mod memory;
@@ -30,6 +31,7 @@ pub fn tong(args: &TongArgs) -> Result<Findings, PaperError> {
         Part::Merge => merge::run(args),
         Part::Table => table::run(args, rivals),
         Part::Sweep => sweep::run(args, rivals),
+        Part::Batches => batches::run(args, rivals),
         Part::Memory => memory::run(args, rivals),
     })
 }

@@ -6,8 +6,8 @@ use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, BrickSide, Camera, Grid, Knot, Level, Projection, TransferFunction};
 use brickfield_frame::{
     DarkRegions, Decode, Division, Drawing, FeatureSet, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join,
-    Mode, Placement, PlanParts, QuadratureRule, RayFrame, Reach, SampleFormat, Sampling, Slices, Slots, SpoiltPlan,
-    Steps, Target,
+    Mode, Placement, PlanParts, QuadratureRule, RayFrame, Reach, SampleFormat, Sampling, Sequence, Slices, Slots,
+    SpoiltPlan, Steps, Target,
 };
 
 const N: u32 = 16;
@@ -65,6 +65,7 @@ pub(crate) fn plan(slots: Slots, transfer: TransferFunction, rule: QuadratureRul
         lighting: None,
         dark: DarkRegions::default(),
         drawing: Drawing::Rays,
+        sequence: Sequence::Whole,
     };
     FramePlan::new(parts).unwrap()
 }
@@ -86,6 +87,7 @@ fn parts(plan: &FramePlan) -> PlanParts {
         lighting: None,
         dark: DarkRegions::default(),
         drawing: Drawing::Rays,
+        sequence: Sequence::Whole,
     }
 }
 

@@ -89,18 +89,21 @@ impl<'a> Path<'a> {
 /// Most segments that are counted from one node: in f32 they are still whole.
 const MOST: i64 = 1 << 23;
 
-/// The pixel of a ray, of which some runs of segments may see something, front to back.
+/// A ray, of which some runs of segments may see something, front to back, behind what it has seen.
 #[inline(always)]
-pub(super) fn march<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
+pub(super) fn march<const N: usize, S: Stored>(
+    plan32: &F32Plan<N, S>,
+    ray: &PlanRay,
+    runs: &[Range<i64>],
+    state: &mut Ray32,
+) {
     let plan = plan32.plan;
     let domain = (plan.domain().min - plan32.center, plan.domain().max - plan32.center);
-    let Some(span) = clip(ray, domain, ray.t_eye) else { return [0.0; 4] };
-    let mut state = Ray32::default();
+    let Some(span) = clip(ray, domain, ray.t_eye) else { return };
     match plan.sampling().division() {
-        Division::Ray => along(plan32, &Path::new(plan.sampling(), ray, span, Level(0)), runs, &mut state),
-        Division::Brick => brick_by_brick(plan32, ray, span, &mut state),
+        Division::Ray => along(plan32, &Path::new(plan.sampling(), ray, span, Level(0)), runs, state),
+        Division::Brick => brick_by_brick(plan32, ray, span, state),
     }
-    state.rgba(1.0)
 }
 
 fn floor(x: f64) -> i64 {
@@ -121,7 +124,7 @@ fn along<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, path: &Path, runs: &
                 state.push(single(plan32, path, k));
             }
             k += n.max(1);
-            if state.transmittance < floor || state.transmittance == 0.0 {
+            if state.has_ended(floor) {
                 return;
             }
         }
@@ -150,7 +153,7 @@ fn brick_by_brick<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, ray: &PlanR
         if path.end - 1 > path.first {
             state.push(single_in(plan32, &path, &block, path.end - 1));
         }
-        if state.transmittance < floor || state.transmittance == 0.0 {
+        if state.has_ended(floor) {
             return;
         }
     }

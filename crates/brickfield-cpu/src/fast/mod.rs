@@ -20,7 +20,7 @@ use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickSide, Image};
 use brickfield_frame::{
     Backend, Capabilities, Description, Evaluate, Frame, FramePlan, Join, Places, PlanRay, RenderError, SampleFormat,
-    ShaderFunction, Timing, check_memory,
+    ShaderFunction, Timing, check_batch, check_memory,
 };
 use brickfield_interp::Neighbourhood;
 use rayon::prelude::*;
@@ -28,8 +28,10 @@ use rayon::prelude::*;
 use brick::{Float32, Stored, Unorm8, Unorm16};
 use classify::{Classifier, Optics32};
 use f32_plan::F32Plan;
+use light::Lamp;
 use placed::PlacedPlan;
 use prefiltered::{Values32, expected};
+use segment::Ray32;
 
 /// Most pixels along a side of a picture.
 const MAX_IMAGE: u32 = 1 << 16;
@@ -76,15 +78,30 @@ impl Backend for CpuBackend {
         &self.description
     }
 
-    fn render(&mut self, plan: &FramePlan) -> Result<Frame, RenderError> {
-        check(plan)?;
-        check_memory(plan.size())?;
-        if plan.shows_nothing() {
-            return Ok(Frame::new(Image::transparent(plan.size()), Timing::default()));
+    fn render_batches(
+        &mut self,
+        size: UVec2,
+        batches: &mut dyn Iterator<Item = FramePlan>,
+    ) -> Result<Frame, RenderError> {
+        check(size)?;
+        check_memory(size)?;
+        let (mut rays, mut brightest) = (Vec::new(), 1.0);
+        let mut wall_ms = 0.0;
+        for plan in batches {
+            check_batch(&plan, size)?;
+            if plan.shows_nothing() {
+                continue;
+            }
+            let begin = Instant::now();
+            rays.resize(size.x as usize * size.y as usize, Ray32::default());
+            brightest = dispatch(&plan, Rendering { rays: &mut rays });
+            wall_ms += milliseconds(begin);
         }
-        let begin = Instant::now();
-        let image = dispatch(plan, Rendering);
-        Ok(Frame::new(image, Timing::of_rendering(milliseconds(begin))))
+        let mut image = Image::transparent(size);
+        for (pixel, ray) in image.pixels_mut().iter_mut().zip(&rays) {
+            *pixel = ray.rgba(brightest);
+        }
+        Ok(Frame::new(image, Timing::of_rendering(wall_ms)))
     }
 
     fn as_evaluate(&mut self) -> Option<&mut dyn Evaluate> {
@@ -99,7 +116,7 @@ impl Evaluate for CpuBackend {
         function: ShaderFunction,
         inputs: &[[f32; 4]],
     ) -> Result<Vec<[f32; 4]>, RenderError> {
-        check(plan)?;
+        check(plan.size())?;
         Ok(dispatch(plan, Evaluation { function, inputs }))
     }
 }
@@ -134,8 +151,8 @@ trait Renderer: Sync {
         [0.0; 4]
     }
 
-    /// The pixel of a ray, of which some runs of segments may see something, front to back.
-    fn pixel(&self, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4];
+    /// A ray, of which some runs of segments may see something, front to back, behind what it has seen.
+    fn march(&self, ray: &PlanRay, runs: &[Range<i64>], state: &mut Ray32);
 }
 
 impl<const N: usize, S: Stored> Renderer for F32Plan<'_, N, S> {
@@ -152,10 +169,10 @@ impl<const N: usize, S: Stored> Renderer for F32Plan<'_, N, S> {
     }
 
     #[inline(always)]
-    fn pixel(&self, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
+    fn march(&self, ray: &PlanRay, runs: &[Range<i64>], state: &mut Ray32) {
         match self.plan.lighting() {
-            None => march::march(self, ray, runs),
-            Some(_) => single::pixel(self, ray, runs),
+            None => march::march(self, ray, runs, state),
+            Some(_) => single::march_singly(self, ray, runs, state),
         }
     }
 }
@@ -184,18 +201,19 @@ fn dispatch_side<S: Stored, W: Work>(plan: &FramePlan, work: W) -> W::Output {
     }
 }
 
-struct Rendering;
+/// The rays of all pixels go on; the result is the brightest colour that they may show.
+struct Rendering<'a> {
+    rays: &'a mut [Ray32],
+}
 
-impl Work for Rendering {
-    type Output = Image<f32>;
-    fn run(self, renderer: &impl Renderer) -> Image<f32> {
-        let size = renderer.plan().size();
-        let mut image = Image::transparent(size);
-        let width = size.x.max(1) as usize;
+impl Work for Rendering<'_> {
+    type Output = f32;
+    fn run(self, renderer: &impl Renderer) -> f32 {
+        let width = renderer.plan().size().x.max(1) as usize;
         let simd = pulp::Arch::new();
-        let bands = image.pixels_mut().par_chunks_mut(width * TILE).enumerate();
-        bands.for_each(|(band, pixels)| simd.dispatch(Band { renderer, first_row: band * TILE, width, pixels }));
-        image
+        let bands = self.rays.par_chunks_mut(width * TILE).enumerate();
+        bands.for_each(|(band, rays)| simd.dispatch(Band { renderer, first_row: band * TILE, width, rays }));
+        Lamp::of(renderer).map_or(1.0, |lamp| lamp.brightest())
     }
 }
 
@@ -209,14 +227,14 @@ struct Band<'a, R> {
     renderer: &'a R,
     first_row: usize,
     width: usize,
-    pixels: &'a mut [[f32; 4]],
+    rays: &'a mut [Ray32],
 }
 
 impl<R: Renderer> pulp::NullaryFnOnce for Band<'_, R> {
     type Output = ();
     #[inline(always)]
     fn call(self) {
-        let n_rows = self.pixels.len() / self.width;
+        let n_rows = self.rays.len() / self.width;
         let plan = self.renderer.plan();
         for tile in (0..self.width).step_by(TILE) {
             let columns = tile..(tile + TILE).min(self.width);
@@ -227,7 +245,16 @@ impl<R: Renderer> pulp::NullaryFnOnce for Band<'_, R> {
             }
             for (y, x) in (0..n_rows).flat_map(|y| columns.clone().map(move |x| (y, x))) {
                 let ray = plan.rays().ray(x as u32, (self.first_row + y) as u32);
-                self.pixels[y * self.width + x] = self.renderer.pixel(&ray, runs);
+                let state = &mut self.rays[y * self.width + x];
+                match plan.proxy() {
+                    None => self.renderer.march(&ray, runs, state),
+                    // Batches of polygons come from back to front.
+                    Some(_) => {
+                        let mut front = Ray32::default();
+                        self.renderer.march(&ray, runs, &mut front);
+                        *state = front.before(state);
+                    }
+                }
             }
         }
     }
@@ -297,8 +324,7 @@ fn weights(plan: &FramePlan, position: [f32; 3]) -> Option<[[f32; 4]; 2]> {
 }
 
 /// Refuses pictures that are too large.
-fn check(plan: &FramePlan) -> Result<(), RenderError> {
-    let size: UVec2 = plan.size();
+fn check(size: UVec2) -> Result<(), RenderError> {
     if size.max_element() > MAX_IMAGE {
         return Err(RenderError::ImageTooLarge { size, limit: MAX_IMAGE });
     }

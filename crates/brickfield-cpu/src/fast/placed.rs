@@ -13,6 +13,7 @@ use super::brick::{Stored, Unorm8};
 use super::classify::{Classifier, Optics32};
 use super::f32_plan::Numbers;
 use super::prefiltered::{Values32, expected};
+use super::segment::Ray32;
 use super::{Renderer, single};
 
 /// A plan whose places differ, and whose samples are stored as `S`.
@@ -153,8 +154,8 @@ impl<S: Stored> Renderer for PlacedPlan<'_, S> {
         })
     }
 
-    fn pixel(&self, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
-        single::pixel(self, ray, runs)
+    fn march(&self, ray: &PlanRay, runs: &[Range<i64>], state: &mut Ray32) {
+        single::march_singly(self, ray, runs, state);
     }
 }
 

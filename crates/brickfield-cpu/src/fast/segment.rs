@@ -39,6 +39,18 @@ impl Ray32 {
         self.transmittance *= 1.0 - f64::from(s.alpha);
     }
 
+    /// This ray, and behind it one that goes on.
+    pub(super) fn before(&self, behind: &Ray32) -> Ray32 {
+        let sum = |i: usize| self.rgba[i] + self.transmittance * behind.rgba[i];
+        Ray32 { transmittance: self.transmittance * behind.transmittance, rgba: std::array::from_fn(sum) }
+    }
+
+    /// Whether nothing, or less than a floor, shines through any more.
+    #[inline(always)]
+    pub(super) fn has_ended(&self, floor: f64) -> bool {
+        self.transmittance < floor || self.transmittance == 0.0
+    }
+
     /// The pixel: alpha at most 1, colours at most `brightest`.
     pub(super) fn rgba(&self, brightest: f32) -> [f32; 4] {
         let [r, g, b, a] = self.rgba.map(|x| x as f32);

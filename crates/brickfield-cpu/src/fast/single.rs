@@ -11,23 +11,21 @@ use super::classify::Optics32;
 use super::light::Lamp;
 use super::march::{self, Path, clip, nodes_of};
 use super::segment::{Ray32, Segment32, lit_segment, segment_of};
-use crate::blocks::Blocks;
+use crate::blocks::{Blocks, Crossing};
 
-/// The pixel of a ray, of which some runs of segments may see something, front to back.
-pub(super) fn pixel(renderer: &impl Renderer, ray: &PlanRay, runs: &[Range<i64>]) -> [f32; 4] {
+/// A ray, of which some runs of segments may see something, front to back, behind what it has seen.
+pub(super) fn march_singly(renderer: &impl Renderer, ray: &PlanRay, runs: &[Range<i64>], state: &mut Ray32) {
     let (plan, center) = (renderer.plan(), renderer.plan().rays().center);
     let domain = (plan.domain().min - center, plan.domain().max - center);
-    let Some(span) = clip(ray, domain, ray.t_eye) else { return [0.0; 4] };
-    let (mut state, lamp) = (Ray32::default(), Lamp::of(renderer));
-    let floor = plan.sampling().transmittance_floor();
-    let has_ended = |state: &Ray32| state.transmittance < floor || state.transmittance == 0.0;
+    let Some(span) = clip(ray, domain, ray.t_eye) else { return };
+    let (lamp, floor) = (Lamp::of(renderer), plan.sampling().transmittance_floor());
     match plan.sampling().division() {
         Division::Ray => {
             let path = Path::new(plan.sampling(), ray, span, Level(0));
             for run in runs {
                 let (mut k, end) = (path.first.max(run.start), path.end.min(run.end));
                 let mut seen_until = k;
-                while k < end && !has_ended(&state) {
+                while k < end && !state.has_ended(floor) {
                     if k >= seen_until {
                         let (n, is_dark) = alike(plan, &path, k);
                         if is_dark && n > 0 {
@@ -36,25 +34,37 @@ pub(super) fn pixel(renderer: &impl Renderer, ray: &PlanRay, runs: &[Range<i64>]
                         }
                         seen_until = k + n.max(1);
                     }
-                    state.push(one(renderer, lamp.as_ref(), &path, k, |q| plan.field().cell_at(q)));
+                    if !is_lent(plan, &path, k) {
+                        state.push(one(renderer, lamp.as_ref(), &path, k, |q| plan.field().cell_at(q)));
+                    }
                     k += 1;
                 }
             }
         }
         Division::Brick => {
-            for crossing in Blocks::new(plan, ray, span).filter(|c| c.entry.slot().is_some()) {
+            let is_seen = |c: &Crossing| c.entry.slot().is_some() && !plan.is_lent(c.cell);
+            for crossing in Blocks::new(plan, ray, span).filter(is_seen) {
+                if state.has_ended(floor) {
+                    break;
+                }
                 let level = plan.field().level_at(crossing.cell);
                 let path = Path::new(plan.sampling(), ray, crossing.span, level);
                 for k in path.first..path.end {
                     state.push(one(renderer, lamp.as_ref(), &path, k, |_| crossing.cell));
                 }
-                if has_ended(&state) {
-                    break;
-                }
             }
         }
     }
-    state.rgba(lamp.map_or(1.0, |lamp| lamp.brightest()))
+}
+
+/// Whether a segment is another batch's: of a segment whose first node is in an empty block, the second one's block decides.
+fn is_lent(plan: &FramePlan, path: &Path, k: i64) -> bool {
+    if !plan.has_lent() {
+        return false;
+    }
+    let (nodes, _) = nodes_of(plan, path, k, |q| Some(plan.field().cell_at(q)));
+    let is_empty = |cell: &UVec3| plan.field().index().at(*cell).slot().is_none();
+    nodes.into_iter().flatten().find(|cell| !is_empty(cell)).is_some_and(|cell| plan.is_lent(cell))
 }
 
 /// How many segments from `k` on have all their nodes in one region that is dark, or in one that may not be; and which it is.
@@ -75,6 +85,9 @@ fn region_at(plan: &FramePlan, q: DVec3) -> (Aabb, bool) {
     let cell = field.cell_at(q);
     let mut region = field.block_box(cell);
     let Some(slot) = field.index().at(cell).slot() else { return (region, true) };
+    if plan.is_lent(cell) {
+        return (region, true);
+    }
     let Some(kept) = plan.kept().map(|kept| kept.boxes()[slot as usize]) else { return (region, false) };
     let in_region = |p: DVec3| p.clamp(region.min, region.max);
     let kept = Aabb { min: in_region(kept.min), max: in_region(kept.max) };

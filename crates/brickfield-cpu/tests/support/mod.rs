@@ -10,7 +10,7 @@ use brickfield_core::{
 use brickfield_frame::{
     Chunk, DarkRegions, Decode, Division, Drawing, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join,
     Lengths, MacrocellRanges, Mode, Occupancy, Placement, Places, PlanParts, RayFrame, Reach, SampleFormat, Sampling,
-    Slots, Steps,
+    Sequence, Slots, Steps,
 };
 use brickfield_optics::QuadratureRule;
 
@@ -103,6 +103,7 @@ impl<'a> Setup<'a> {
             lighting: None,
             dark,
             drawing: Drawing::Rays,
+            sequence: Sequence::Whole,
         }
     }
 }

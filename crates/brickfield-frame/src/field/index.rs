@@ -275,7 +275,7 @@ impl IndexGrid {
     }
 
     /// The box around all resident blocks in sample space, as far as the volume of `dims` samples reaches.
-    pub(crate) fn resident_box(&self, dims: UVec3) -> Option<brickfield_core::Aabb> {
+    pub fn resident_box(&self, dims: UVec3) -> Option<brickfield_core::Aabb> {
         let (low, high) = self.resident?;
         let face = |cell: UVec3| cell.as_dvec3() * f64::from(self.lattice.cell_samples) + self.lattice.origin;
         Some(brickfield_core::Aabb {

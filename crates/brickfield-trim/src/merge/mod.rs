@@ -296,7 +296,7 @@ impl MergedBricks {
 }
 
 impl ChunkPart {
-    fn part(&self) -> Part {
+    pub(crate) fn part(&self) -> Part {
         Part { samples: self.samples, axes: self.axes }
     }
 

@@ -154,6 +154,28 @@ proptest! {
     }
 
     #[test]
+    fn pages_hold_every_sample_that_is_seen_once(
+        field in field(64), transfer in transfer(), options in options(), parts in parts(), more in 0..40u32, way in 0..3
+    ) {
+        let trimmed = trimmed(&field, &transfer);
+        let side = UVec3::splat(trimmed.layout().side().n_samples() + more);
+        let paged = match way {
+            0 => PagedBricks::packed(&trimmed, side),
+            1 => PagedBricks::alone(&trimmed, side),
+            _ => PagedBricks::merged(&merge_bricks(&trimmed, &options).unwrap(), options.cache),
+        };
+        let paged = paged.unwrap();
+        for (i, brick) in paged.bricks().iter().enumerate() {
+            prop_assert_eq!(brick.is_some(), !trimmed.kept()[i].is_empty());
+            let Some(PagedBrick { page, place }) = brick else { continue };
+            prop_assert!(paged.pages()[*page].contains(&i) && (place.texel + place.n).cmple(paged.texels()).all());
+        }
+        let stored = paged.one_upon_the_other();
+        check_samples(&field, &transfer, &stored)?;
+        check_picture(&field, &transfer, &stored, &parts)?;
+    }
+
+    #[test]
     fn chunks_are_referred_to_by_the_clusters_of_their_bricks(
         field in field(64), transfer in transfer(), options in options()
     ) {

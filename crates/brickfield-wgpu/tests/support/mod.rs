@@ -9,7 +9,7 @@ use brickfield_core::{
 };
 use brickfield_frame::{
     Chunk, DarkRegions, Decode, Drawing, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, Mode, Places,
-    PlanParts, QuadratureRule, RayFrame, Reach, SampleFormat, Sampling, Slots, Steps,
+    PlanParts, QuadratureRule, RayFrame, Reach, SampleFormat, Sampling, Sequence, Slots, Steps,
 };
 use brickfield_wgpu::{AdapterChoice, OpenError, WgpuBackend};
 
@@ -99,6 +99,7 @@ impl Setup {
             lighting: None,
             dark: DarkRegions::default(),
             drawing: Drawing::Rays,
+            sequence: Sequence::Whole,
         }
     }
 

@@ -144,6 +144,9 @@ struct RenderArgs {
     #[arg(long, value_name = "HOW", conflicts_with = "show_bricks",
           value_parser = PossibleValuesParser::new(Trimming::NAMES), hide_possible_values = true)]
     trim: Option<String>,
+    /// Bytes that the trimmed bricks' texture may take on the device, in MiB: what does not fit is drawn in batches, with the same picture
+    #[arg(long, value_name = "MIB", requires = "trim", value_parser = values::positive, allow_hyphen_values = true)]
+    cache_mib: Option<f64>,
     #[arg(long, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "drawn",
           conflicts_with = "blocks", value_parser = values::boxes, help = show_bricks_help())]
     show_bricks: Option<Boxes>,

@@ -16,8 +16,9 @@ use brickfield::options::Blocks;
 use brickfield::options::{BlockSubject, Boxes, FinestVoxels, OptionError, Subject, values};
 use brickfield::overlay::{LevelColor, show_bricks, show_bricks_faintly};
 use brickfield::{
-    BackendError, BackendKind, BlockResidency, Classification, Residency, Scene, Technique, TrimResidency,
-    TrimmedVolume, Trimming, check_picture_path, open_backend, prepare, prepare_blocks, prepare_trimmed, write_picture,
+    BackendError, BackendKind, BlockResidency, CacheCounts, CacheOptions, Classification, Residency, Scene, Technique,
+    TrimCache, TrimResidency, TrimmedVolume, Trimming, check_picture_path, open_backend, prepare, prepare_blocks,
+    prepare_trimmed, prepare_trimmed_batches, render_ahead, write_picture,
 };
 
 use crate::{Failure, RenderArgs, mib, print};
@@ -108,11 +109,8 @@ fn render_blocks(args: &RenderArgs, side: BlockSide, backend: &mut dyn Backend) 
     let selection = args.flat.select(&subject, &scene)?;
     let (levels, mut residency) = (&selection.levels, BlockResidency::default());
     let plan = prepare_blocks(source, &scene, levels.levels(), args.flat.style(), &mut residency)?;
-    note_if_nothing_shows(&plan);
     let frame = backend.render(&plan)?;
-    let attributes = attributes(args, backend, &scene, &plan);
-    write_picture(&args.out, &frame.image, args.view.background.0, &attributes)?;
-    print(&summary(backend, &scene, &plan, &frame))?;
+    finish(args, backend, &scene, (&plan, &frame))?;
     print(&block_summary(&subject, levels, &residency, &plan))?;
     #[cfg(feature = "formats")]
     if let Blocks::Store(store) = &subject.blocks {
@@ -128,15 +126,56 @@ fn render_trimmed(args: &RenderArgs, trimming: Trimming, backend: &mut dyn Backe
     let (volume, grid) = (source.volume(), source.volume().grid());
     let scene = args.sampling.of(args.view.scene_of(grid, frame, &transfer)?, Some(FinestVoxels::Volume(volume)))?;
     let scene = args.light.of(scene, volume.range(), grid)?;
+    if let Some(mib) = args.cache_mib {
+        return render_in_batches(args, trimming, backend, (&source, &scene), mib);
+    }
     let mut residency = TrimResidency::default();
     let plan = prepare_trimmed(&source, &scene, trimming, &mut residency).map_err(Failure::usage)?;
-    note_if_nothing_shows(&plan);
     let frame = backend.render(&plan)?;
-    let attributes = attributes(args, backend, &scene, &plan);
-    write_picture(&args.out, &frame.image, args.view.background.0, &attributes)?;
-    print(&summary(backend, &scene, &plan, &frame))?;
+    finish(args, backend, &scene, (&plan, &frame))?;
     print(&trim_summary(&source, &residency, &frame))?;
     check_validation(&backend.validation_messages())
+}
+
+/// Renders trimmed bricks in batches that fit a cache.
+fn render_in_batches(
+    args: &RenderArgs,
+    trimming: Trimming,
+    backend: &mut dyn Backend,
+    (source, scene): (&TrimmedVolume, &Scene),
+    cache_mib: f64,
+) -> Result<(), Failure> {
+    let mut cache = TrimCache::new(CacheOptions::of_bytes((cache_mib * f64::from(1 << 20)) as u64));
+    let batches = prepare_trimmed_batches(source, scene, trimming, &mut cache).map_err(Failure::usage)?;
+    let (size, mut last) = (batches.size(), None);
+    let frame = render_ahead(backend, size, batches.inspect(|plan| last = Some(plan.clone())))?;
+    let Some(plan) = last else {
+        let nothing =
+            prepare_trimmed(source, scene, trimming, &mut TrimResidency::default()).map_err(Failure::usage)?;
+        finish(args, backend, scene, (&nothing, &frame))?;
+        return check_validation(&backend.validation_messages());
+    };
+    finish(args, backend, scene, (&plan, &frame))?;
+    let CacheCounts { n_batches, n_places, n_pages, n_hits, n_misses, .. } = cache.counts();
+    print(&format!(
+        "{n_batches} batch(es), of which the last is above; {n_pages} pages, {n_misses} brought and {n_hits} found in a cache of {n_places}, {:.1} MiB; {:.1} MiB uploaded\n",
+        mib(cache.n_texture_bytes()),
+        mib(frame.uploaded_bytes)
+    ))?;
+    check_validation(&backend.validation_messages())
+}
+
+/// Writes the picture, and prints what it was made by.
+fn finish(
+    args: &RenderArgs,
+    backend: &dyn Backend,
+    scene: &Scene,
+    (plan, frame): (&FramePlan, &Frame),
+) -> Result<(), Failure> {
+    note_if_nothing_shows(plan);
+    let attributes = attributes(args, backend, scene, plan);
+    write_picture(&args.out, &frame.image, args.view.background.0, &attributes)?;
+    print(&summary(backend, scene, plan, frame))
 }
 
 /// The classes of bricks, and the texels that their samples take.
