@@ -211,6 +211,14 @@ fn what_a_scene_does_not_need_is_left_out() {
                 let features = all.without(Feature::SkipDark);
                 (of_blocks(features), of_blocks(features.without(feature)))
             }
+            Feature::Lent => {
+                let of_places = |features| {
+                    let mut variant = Variant::new(features, rule, Entry::March);
+                    variant.field = FieldKind::Placed;
+                    compile(&variant)
+                };
+                (of_places(all), of_places(all.without(feature)))
+            }
             Feature::TransferLookup => (march(unlit, rule), march(unlit.without(feature), rule)),
             _ => (general.clone(), march(all.without(feature), rule)),
         };
