@@ -26,8 +26,8 @@ pub struct Variant {
     pub search: KnotSearch,
     /// Rays are too long for one pass ([`crate::passes`]), and go on where earlier passes ended.
     pub long_rays: bool,
-    /// Whether the plan is a batch, whose rays go on with what they have seen in earlier ones; those of several passes do so, too.
-    pub rays_go_on: bool,
+    /// The plan is a batch: rays go on where earlier batches ended.
+    pub batch: bool,
     /// Texture reads of 16-bit samples are turned back into integers, of which f32 keeps all digits.
     pub integer_samples: bool,
     /// The entry point.
@@ -253,7 +253,7 @@ impl Variant {
             segments: Segments::default(),
             search: KnotSearch::Unrolled(2),
             long_rays: false,
-            rays_go_on: false,
+            batch: false,
             integer_samples: false,
             entry,
         }
@@ -268,7 +268,7 @@ impl Variant {
             segments: Segments::of(plan),
             search: KnotSearch::of(plan),
             long_rays: entry == Entry::March && has_long_rays(plan),
-            rays_go_on: entry == Entry::March && plan.is_batch(),
+            batch: entry == Entry::March && plan.is_batch(),
             integer_samples: plan.reads_integers(),
             entry,
         }
@@ -328,7 +328,7 @@ impl Variant {
             ("dense", self.field == FieldKind::Dense),
             ("flat_blocks", matches!(self.field, FieldKind::Blocks(_) | FieldKind::Dense)),
             ("long_rays", self.long_rays),
-            ("rays_go_on", self.long_rays || self.rays_go_on),
+            ("rays_go_on", self.long_rays || self.batch),
             ("integer_samples", self.integer_samples),
         ];
         let derived = derived.into_iter().map(|(name, holds)| (name.to_owned(), holds));

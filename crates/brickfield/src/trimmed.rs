@@ -260,9 +260,7 @@ impl Held {
         let new = || chunks.iter().flatten().filter(|(_, n_bytes)| *n_bytes > 0);
         let copied = Copied { n_bricks: new().count(), n_bytes: new().map(|(_, n_bytes)| n_bytes).sum() };
         let chunks: Vec<Option<Arc<Chunk>>> = chunks.into_iter().map(|chunk| chunk.map(|(chunk, _)| chunk)).collect();
-        // A white brick's place is never read.
-        let nowhere = Place::even(UVec3::ZERO, UVec3::ONE, Level(0), DVec3::ZERO);
-        let places = stored.places().iter().map(|place| place.unwrap_or(nowhere)).collect();
+        let places = stored.places().iter().map(|place| place.unwrap_or_else(nowhere)).collect();
         let places = Places::Table { texels: stored.texels().max(UVec3::ONE), places };
         let slots =
             Slots::new(coding.format, coding.decode(), places, chunks.clone()).expect("bricks fill their places");
@@ -277,22 +275,50 @@ impl Held {
 
     /// The field of the bricks that are drawn.
     fn field(&mut self, layout: &BrickLayout, drawn: &[BrickId]) -> Field {
-        let entry =
-            |id: &BrickId| (id.coords, IndexEntry::Resident { slot: layout.ordinal(*id) as u32, reach: Reach(0) });
-        let lattice = IndexLattice { cell_samples: layout.side().n_cells(), origin: 0.0 };
-        let index = IndexGrid::new(layout.n_bricks(Level(0)), lattice, drawn.iter().map(entry));
-        let index = Arc::new(match &self.index {
-            Some(before) => index.following(before),
-            None => index,
-        });
+        let index = Arc::new(index_of(layout, drawn, self.index.as_deref()));
         self.index = Some(Arc::clone(&index));
         let field = Field::new(layout.dims(), index, Arc::clone(&self.slots), Join::Shared);
         field.expect("an index of bricks that are stored")
     }
+}
 
-    /// Whether something of a brick is read while it is drawn.
-    fn is_drawn(&self, ordinal: usize) -> bool {
-        self.trimming == Trimming::Conventional || !self.grown.kept()[ordinal].is_empty()
+/// The place of a brick of which nothing is stored; nobody reads it.
+pub(crate) fn nowhere() -> Place {
+    Place::even(UVec3::ZERO, UVec3::ONE, Level(0), DVec3::ZERO)
+}
+
+/// The index of bricks of level 0, whose slots are numbered as they are.
+pub(crate) fn index_of<'a>(
+    layout: &BrickLayout,
+    bricks: impl IntoIterator<Item = &'a BrickId>,
+    before: Option<&IndexGrid>,
+) -> IndexGrid {
+    let entry = |id: &BrickId| (id.coords, IndexEntry::Resident { slot: layout.ordinal(*id) as u32, reach: Reach(0) });
+    let lattice = IndexLattice { cell_samples: layout.side().n_cells(), origin: 0.0 };
+    let index = IndexGrid::new(layout.n_bricks(Level(0)), lattice, bricks.into_iter().map(entry));
+    match before {
+        Some(before) => index.following(before),
+        None => index,
+    }
+}
+
+/// The bricks of a domain of which something is read while they are drawn; `grown` has what is read of each.
+pub(crate) fn drawn_bricks(trimming: Trimming, grown: &TrimmedBricks, domain: &Aabb) -> Vec<BrickId> {
+    let layout = grown.layout();
+    let is_read = |id: &BrickId| trimming == Trimming::Conventional || !grown.kept()[layout.ordinal(*id)].is_empty();
+    let in_domain = |id: &BrickId| !to_sample_space(layout.index_box(*id)).intersection(domain).is_empty();
+    layout.bricks(Level(0)).filter(|id| is_read(id) && in_domain(id)).collect()
+}
+
+/// Whether a volume's bricks can be drawn at all, in a picture of a scene's size.
+pub(crate) fn check_bricks(source: &TrimmedVolume, scene: &Scene) -> Result<(), PrepareError> {
+    check_size(scene.size)?;
+    check_values(source.volume.range())?;
+    match source.layout().n_bricks_total(Level(0)) {
+        n_bricks if n_bricks >= IndexEntry::MAX_SLOTS as usize => {
+            Err(PrepareError::TooManyBricks { n_bricks, limit: IndexEntry::MAX_SLOTS })
+        }
+        _ => Ok(()),
     }
 }
 
@@ -349,19 +375,12 @@ pub fn prepare_trimmed(
     residency: &mut TrimResidency,
 ) -> Result<FramePlan, PrepareTrimmedError> {
     let trimming = trimming.unless_off(scene.skipping);
-    check_size(scene.size)?;
-    check_values(source.volume.range())?;
+    check_bricks(source, scene)?;
     let (layout, grid) = (*source.layout(), source.grid());
-    let n_bricks = layout.n_bricks_total(Level(0));
-    if n_bricks >= IndexEntry::MAX_SLOTS as usize {
-        return Err(PrepareError::TooManyBricks { n_bricks, limit: IndexEntry::MAX_SLOTS }.into());
-    }
     let Course { domain, sampling, rays } = Course::new(grid, scene, Level(0))?;
     let reach = reach_of(grid, scene);
     let held = residency.hold(source, scene, trimming, reach)?;
-    let in_domain = |id: &BrickId| !to_sample_space(layout.index_box(*id)).intersection(&domain).is_empty();
-    let is_drawn = |id: &BrickId| held.is_drawn(layout.ordinal(*id)) && in_domain(id);
-    let drawn: Vec<BrickId> = layout.bricks(Level(0)).filter(is_drawn).collect();
+    let drawn = drawn_bricks(trimming, &held.grown, &domain);
     let drawing = match scene.technique {
         Technique::RayCasting => Drawing::Rays,
         Technique::Polygons(target) => {

@@ -5,10 +5,8 @@ use std::sync::Arc;
 
 use brickfield_bricks::SourceId;
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Aabb, BrickId, BrickLayout, Level, Place};
-use brickfield_frame::{
-    Chunk, DarkRegions, Field, IndexEntry, IndexGrid, IndexLattice, Join, KeptBoxes, Places, Reach, Slots,
-};
+use brickfield_core::{Aabb, BrickId, BrickLayout};
+use brickfield_frame::{Chunk, DarkRegions, Field, IndexGrid, Join, KeptBoxes, Places, Slots};
 use brickfield_trim::{
     DarkValues, Interpolation, PagedBrick, PagedBricks, TexelAccount, TrimmedBricks, merge_bricks, trim_bricks,
 };
@@ -16,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::block_residency::MAX_TEXELS;
 use crate::encode::Coding;
-use crate::trimmed::{gather, kept_boxes};
+use crate::trimmed::{gather, index_of, kept_boxes, nowhere};
 use crate::{PrepareTrimmedError, Scene, TrimmedVolume, Trimming};
 
 /// The texture cache of a [`TrimCache`].
@@ -104,7 +102,7 @@ pub(super) struct Held {
     dark: DarkValues,
     /// What may be seen of each brick; what is read of it.
     boxes: Vec<Aabb>,
-    grown: TrimmedBricks,
+    pub(super) grown: TrimmedBricks,
     pub(super) paged: PagedBricks,
     pub(super) coding: Coding,
     /// Pages along the texture's axes.
@@ -162,13 +160,8 @@ impl TrimCache {
     }
 }
 
-/// The index cells of bricks of level 0.
-pub(super) fn lattice(layout: &BrickLayout) -> IndexLattice {
-    IndexLattice { cell_samples: layout.side().n_cells(), origin: 0.0 }
-}
-
-/// Most texels along a side of a page of so many bytes.
-fn page_side(layout: &BrickLayout, trimming: Trimming, options: &CacheOptions, sample_bytes: u64) -> UVec3 {
+/// Texels of a page along x, y, z, for samples of so many bytes.
+fn page_texels(layout: &BrickLayout, trimming: Trimming, options: &CacheOptions, sample_bytes: u64) -> UVec3 {
     let side = layout.side().n_samples();
     let least = match trimming {
         Trimming::Merged(options) => options.cache,
@@ -213,7 +206,7 @@ impl Held {
         let trimmed = trim_bricks(source.arrays(), &dark, Interpolation::Trilinear);
         let grown = trimmed.grown(reach);
         let sample_bytes = coding.format.n_bytes() as u64;
-        let page = page_side(&layout, trimming, &options, sample_bytes);
+        let page = page_texels(&layout, trimming, &options, sample_bytes);
         let paged = match trimming {
             Trimming::Conventional | Trimming::Envelope => PagedBricks::packed(&TrimmedBricks::whole(layout), page)?,
             Trimming::Visible => PagedBricks::packed(&grown.untrimmed(), page)?,
@@ -247,10 +240,6 @@ impl Held {
             kept: None,
             index: None,
         })
-    }
-
-    pub(super) fn is_drawn(&self, ordinal: usize) -> bool {
-        self.trimming == Trimming::Conventional || !self.grown.kept()[ordinal].is_empty()
     }
 
     /// Where a place of the cache begins in the texture.
@@ -306,9 +295,8 @@ impl Held {
 
     /// The samples that are in the cache, each at its place.
     fn slots(&mut self) -> Arc<Slots> {
-        let nowhere = Place::even(UVec3::ZERO, UVec3::ONE, Level(0), DVec3::ZERO);
         let place = |brick: &Option<PagedBrick>| {
-            brick.and_then(|b| Some(b.place_from(self.first_texel(self.places[b.page]?)))).unwrap_or(nowhere)
+            brick.and_then(|b| Some(b.place_from(self.first_texel(self.places[b.page]?)))).unwrap_or_else(nowhere)
         };
         let places = self.paged.bricks().iter().map(place).collect();
         let places = Places::Table { texels: (self.grid * self.paged.texels()).max(UVec3::ONE), places };
@@ -325,14 +313,7 @@ impl Held {
     /// The field of a batch, and what of it is dark or another batch's.
     pub(super) fn field(&mut self, layout: &BrickLayout, drawn: &[BrickId], lent: &[BrickId]) -> (Field, DarkRegions) {
         let slots = self.slots();
-        let entry =
-            |id: BrickId| (id.coords, IndexEntry::Resident { slot: layout.ordinal(id) as u32, reach: Reach(0) });
-        let read = drawn.iter().chain(lent).map(|id| entry(*id));
-        let index = IndexGrid::new(layout.n_bricks(Level(0)), lattice(layout), read);
-        let index = Arc::new(match &self.index {
-            Some(before) => index.following(before),
-            None => index,
-        });
+        let index = Arc::new(index_of(layout, drawn.iter().chain(lent), self.index.as_deref()));
         self.index = Some(Arc::clone(&index));
         let field = Field::new(layout.dims(), index, slots, Join::Shared).expect("an index of bricks that are stored");
         if lent.is_empty() && !self.trimming.draws_boxes() {

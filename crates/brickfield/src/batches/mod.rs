@@ -8,18 +8,18 @@ use std::sync::mpsc::sync_channel;
 use brickfield_core::glam::{UVec2, UVec3};
 use brickfield_core::{Aabb, BrickId, BrickLayout, Level, TransferFunction};
 use brickfield_frame::{
-    Backend, Division, Drawing, Frame, FramePlan, IndexEntry, IndexGrid, Lighting, PlanParts, RayFrame, Reach,
-    RenderError, Sampling, Sequence, Slices, Target,
+    Backend, Division, Drawing, Frame, FramePlan, Lighting, PlanParts, RayFrame, RenderError, Sampling, Sequence,
+    Slices, Target,
 };
 use brickfield_lod::back_to_front;
 
 pub use cache::{CacheCounts, CacheError, CacheOptions, Eviction, TrimCache};
 
-use crate::course::{Course, to_sample_space, voxels_in_step};
-use crate::prepare::{check_polygons, check_size, check_values};
-use crate::trimmed::reach_of;
-use crate::{PrepareError, PrepareTrimmedError, Scene, Technique, TrimmedVolume, Trimming};
-use cache::{Held, lattice};
+use crate::course::{Course, voxels_in_step};
+use crate::prepare::check_polygons;
+use crate::trimmed::{check_bricks, drawn_bricks, index_of, reach_of};
+use crate::{PrepareTrimmedError, Scene, Technique, TrimmedVolume, Trimming};
+use cache::Held;
 
 /// Bricks that are drawn together.
 #[derive(Debug, Default)]
@@ -127,20 +127,13 @@ pub fn prepare_trimmed_batches<'a>(
     cache: &'a mut TrimCache,
 ) -> Result<TrimBatches<'a>, PrepareTrimmedError> {
     let trimming = trimming.unless_off(scene.skipping);
-    check_size(scene.size)?;
-    check_values(source.volume().range())?;
+    check_bricks(source, scene)?;
     let (layout, grid) = (*source.layout(), source.volume().grid());
-    let n_bricks = layout.n_bricks_total(Level(0));
-    if n_bricks >= IndexEntry::MAX_SLOTS as usize {
-        return Err(PrepareError::TooManyBricks { n_bricks, limit: IndexEntry::MAX_SLOTS }.into());
-    }
     let Course { domain, sampling, rays } = Course::new(grid, scene, Level(0))?;
     let halo = halo_of(source, scene);
     let options = cache.options;
     let held = cache.hold(source, scene, trimming, reach_of(grid, scene))?;
-    let in_domain = |id: &BrickId| !to_sample_space(layout.index_box(*id)).intersection(&domain).is_empty();
-    let is_drawn = |id: &BrickId| held.is_drawn(layout.ordinal(*id)) && in_domain(id);
-    let drawn: Vec<BrickId> = layout.bricks(Level(0)).filter(is_drawn).collect();
+    let drawn = drawn_bricks(trimming, &held.grown, &domain);
     let mut order: Vec<BrickId> =
         back_to_front(&layout, grid, &scene.camera, &drawn).into_iter().map(|i| drawn[i]).collect();
     let target = match scene.technique {
@@ -167,9 +160,9 @@ pub fn prepare_trimmed_batches<'a>(
     let n_places = held.pages.len();
     cache.counts = CacheCounts { n_batches: batches.len(), n_places, n_pages, ..CacheCounts::default() };
     // As the plan of one batch has it.
-    let cells = drawn.iter().map(|id| (id.coords, IndexEntry::Resident { slot: 0, reach: Reach(0) }));
-    let index = IndexGrid::new(layout.n_bricks(Level(0)), lattice(&layout), cells);
-    let visible = index.resident_box(layout.dims()).unwrap_or(Aabb { min: domain.min, max: domain.min });
+    let visible = index_of(&layout, &drawn, None)
+        .resident_box(layout.dims())
+        .unwrap_or(Aabb { min: domain.min, max: domain.min });
     let lighting = scene.light.map(|light| Lighting::new(light, grid));
     let transfer = scene.transfer.clone();
     Ok(TrimBatches {
