@@ -6,31 +6,35 @@ use std::time::Instant;
 use brickfield_core::Image as Picture;
 use brickfield_core::glam::UVec2;
 use brickfield_frame::{
-    Backend, Capabilities, Description, Evaluate, Frame, FramePlan, ProxyGeometry, RenderError, Resource,
-    ShaderFunction, Target, Timing, check_batch, check_memory,
+    Backend, Capabilities, Cost, Description, Evaluate, Frame, FramePlan, ProxyGeometry, RenderError, Resource,
+    ShaderChoice, ShaderFunction, Target, Timing, check_memory, draw_batches,
 };
-use brickfield_shaders::{Entry, ShaderLibrary, Variant, n_rays_that_go_on, passes};
+use brickfield_shaders::{Chosen, PipelineKey, Pipelines, ShaderLibrary, n_rays_that_go_on, passes};
 
 use crate::march::{RenderTime, march, milliseconds_since, read_back, reserve_picture};
 use crate::options::choose;
 use crate::polygons::{Polygons, reserve_canvas};
 use crate::resources::{Brought, Resources, missing};
 use crate::staging::Staging;
-use crate::variants::Variants;
-use crate::vulkan::{Bindable, Canvas, Device, Instance, PhysicalDevice, Queue, Use, VulkanImage, physical_devices};
-use crate::{ConnectError, Options, ValidationLog};
+use crate::stored_pipelines::StoredPipelines;
+use crate::vulkan::{
+    Bindable, Canvas, Device, Instance, PhysicalDevice, Pipeline, Queue, Use, VulkanImage, physical_devices,
+};
+use crate::{ConnectError, Options, PipelineFile, SaveError, ValidationLog};
 
 /// Replays frame plans through Vulkan, without a window.
 pub struct AshBackend {
     pub(crate) device: Arc<Device>,
     pub(crate) queue: Queue,
-    pub(crate) variants: Variants,
+    pub(crate) pipelines: Pipelines<Pipeline>,
     pub(crate) resources: Resources,
     pub(crate) staging: Staging,
     picture: Option<VulkanImage>,
     canvas: Option<Canvas>,
     polygons: Polygons,
     description: Description,
+    /// After the pipelines, so that those of other threads are in it.
+    stored: Option<StoredPipelines>,
 }
 
 impl AshBackend {
@@ -47,15 +51,29 @@ impl AshBackend {
         let device = Device::new(instance, chosen)?;
         Ok(AshBackend {
             queue: Queue::new(&device)?,
-            variants: Variants::new(ShaderLibrary::embedded()),
+            pipelines: pipelines(&device, ShaderLibrary::embedded()),
             resources: Resources::new(&device)?,
             staging: Staging::new(&device, options.copy_bytes),
             picture: None,
             canvas: None,
             polygons: Polygons::new(),
             description,
+            stored: options.pipelines.as_deref().map(|path| StoredPipelines::open(&device, path)),
             device,
         })
+    }
+
+    /// What came of the file of pipelines; `None` without [`Options::pipelines`].
+    pub fn pipeline_file(&self) -> Option<&PipelineFile> {
+        self.stored.as_ref().map(StoredPipelines::file)
+    }
+
+    /// Writes the file of pipelines now, if there is one and more to keep than it has.
+    ///
+    /// # Errors
+    /// A driver that does not give them, a file that cannot be written.
+    pub fn save_pipelines(&mut self) -> Result<(), SaveError> {
+        self.stored.as_mut().map_or(Ok(()), StoredPipelines::save)
     }
 
     /// The backend with other shader sources: conformance runs see by them whether their cases notice a defect.
@@ -67,7 +85,9 @@ impl AshBackend {
 
     /// Replaces the shader sources.
     pub fn set_library(&mut self, library: ShaderLibrary) {
-        self.variants = Variants::new(library);
+        let choice = self.pipelines.choice();
+        self.pipelines = pipelines(&self.device, library);
+        self.pipelines.set_choice(choice);
     }
 
     /// The messages of the validation layer, as a log that outlives the backend: messages about its end are in it, too.
@@ -75,10 +95,26 @@ impl AshBackend {
         self.device.instance().log().clone()
     }
 
-    /// Casts the rays of a batch into the picture; how long it took, and the bytes that were brought to the device.
-    fn replay(&mut self, plan: &FramePlan, is_first: bool) -> Result<(Timing, u64), RenderError> {
+    /// Draws a batch, over those before it.
+    fn draw(&mut self, plan: &FramePlan, is_first: bool) -> Result<Cost, RenderError> {
         let started = Instant::now();
-        let pipeline = self.variants.pipeline(&self.device, Variant::of(plan, Entry::March))?;
+        let chosen = self.pipelines.choose(PipelineKey::of(plan))?;
+        let (timing, uploaded_bytes) = match plan.proxy() {
+            Some(proxy) => self.rasterise(plan, proxy, is_first, (chosen, started))?,
+            None => self.replay(plan, is_first, (chosen, started))?,
+        };
+        self.pipelines.note(chosen, timing.device_ms.unwrap_or(timing.wall_ms));
+        Ok(Cost { timing, uploaded_bytes, is_general: chosen.is_general() })
+    }
+
+    /// Casts the rays of a batch into the picture; how long it took, and the bytes that were brought to the device.
+    fn replay(
+        &mut self,
+        plan: &FramePlan,
+        is_first: bool,
+        (chosen, started): (Chosen, Instant),
+    ) -> Result<(Timing, u64), RenderError> {
+        let pipeline = self.pipelines.of(chosen.key)?;
         let Brought { uniforms, n_bytes } = self.resources.bring(&mut self.queue, &mut self.staging, plan, pipeline)?;
         let picture = reserve_picture(&mut self.picture, &self.device, plan.size())?;
         let group_height = pipeline.workgroup_size()[1];
@@ -103,11 +139,10 @@ impl AshBackend {
         plan: &FramePlan,
         proxy: &Arc<ProxyGeometry>,
         is_first: bool,
+        (chosen, started): (Chosen, Instant),
     ) -> Result<(Timing, u64), RenderError> {
-        let (started, target) = (Instant::now(), proxy.target());
-        let canvas = reserve_canvas(&mut self.canvas, &self.device, target, plan.size())?;
-        let variant = Variant::of(plan, Entry::Proxy(proxy.slices()));
-        let pipeline = self.variants.blending_into(&self.device, variant, target)?;
+        let canvas = reserve_canvas(&mut self.canvas, &self.device, proxy.target(), plan.size())?;
+        let pipeline = self.pipelines.of(chosen.key)?;
         let brought = self.resources.bring(&mut self.queue, &mut self.staging, plan, pipeline)?;
         let of_polygons = self.polygons.bring(&self.device, &mut self.queue, &mut self.staging, proxy)?;
         let resources = &self.resources;
@@ -135,10 +170,17 @@ enum Drawn {
     Polygons(Target),
 }
 
+/// The pipelines of a device, none yet.
+fn pipelines(device: &Arc<Device>, library: ShaderLibrary) -> Pipelines<Pipeline> {
+    let device = Arc::clone(device);
+    Pipelines::new(move |key| {
+        let limit = device.physical().limits.max_per_stage_descriptor_storage_buffers;
+        Pipeline::new(&device, &library.specialise_within(&key.variant, limit)?, key.target)
+    })
+}
+
 fn timing(upload_ms: f64, time: &RenderTime) -> Timing {
-    let mut timing = Timing::of_rendering(time.wall_ms);
-    (timing.upload_ms, timing.device_ms) = (upload_ms, time.device_ms);
-    timing
+    Timing { upload_ms, device_ms: time.device_ms, wall_ms: time.wall_ms, read_back_ms: 0.0 }
 }
 
 impl Backend for AshBackend {
@@ -160,26 +202,20 @@ impl Backend for AshBackend {
             return Err(RenderError::ImageTooLarge { size, limit });
         }
         check_memory(size)?;
-        let (mut timing, mut n_bytes, mut drawn) = (Timing::default(), 0, None);
-        for plan in batches {
-            check_batch(&plan, size)?;
-            if plan.shows_nothing() {
-                continue;
-            }
-            let is_first = drawn.is_none();
-            let (of_batch, brought) = match plan.proxy() {
-                Some(proxy) => self.rasterise(&plan, proxy, is_first)?,
-                None => self.replay(&plan, is_first)?,
-            };
-            timing = if is_first { of_batch } else { timing.and(&of_batch) };
-            n_bytes += brought;
-            drawn = Some(plan.proxy().map_or(Drawn::Rays, |proxy| Drawn::Polygons(proxy.target())));
-        }
-        let Some(drawn) = drawn else { return Ok(Frame::new(Picture::transparent(size), timing)) };
+        let mut drawn = Drawn::Rays;
+        let cost = draw_batches(size, batches, |plan, is_first| {
+            drawn = plan.proxy().map_or(Drawn::Rays, |proxy| Drawn::Polygons(proxy.target()));
+            self.draw(plan, is_first)
+        })?;
+        let Some(mut cost) = cost else { return Ok(Frame::new(Picture::transparent(size), Cost::default())) };
         let started = Instant::now();
         let image = self.bring_back(drawn)?;
-        timing.read_back_ms = milliseconds_since(started);
-        Ok(Frame::new(image, timing).with_upload(n_bytes))
+        cost.timing.read_back_ms = milliseconds_since(started);
+        Ok(Frame::new(image, cost))
+    }
+
+    fn choose_shaders(&mut self, choice: ShaderChoice) {
+        self.pipelines.set_choice(choice);
     }
 
     fn as_evaluate(&mut self) -> Option<&mut dyn Evaluate> {

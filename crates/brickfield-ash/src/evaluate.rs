@@ -1,7 +1,7 @@
 //! One function of the shaders on a list of inputs.
 
 use brickfield_frame::{FramePlan, RenderError, Resource, ShaderFunction};
-use brickfield_shaders::{Entry, Variant, shader_inputs, shader_outputs};
+use brickfield_shaders::{Entry, PipelineKey, Variant, shader_inputs, shader_outputs};
 
 use crate::AshBackend;
 use crate::resources::missing;
@@ -18,7 +18,7 @@ impl AshBackend {
         inputs: &[[f32; 4]],
     ) -> Result<Vec<[f32; 4]>, RenderError> {
         let variant = Variant::of(plan, Entry::Evaluate(function));
-        let pipeline = self.variants.pipeline(&self.device, variant)?;
+        let pipeline = self.pipelines.of(PipelineKey::computing(variant))?;
         self.resources.bring(&mut self.queue, &mut self.staging, plan, pipeline)?;
         let mut outputs = Vec::with_capacity(inputs.len());
         for chunk in shader_inputs(plan, function, inputs).chunks(INPUTS_PER_DISPATCH) {
@@ -39,7 +39,7 @@ impl AshBackend {
         let target = self.resources.reserve(Resource::Inputs, n_bytes)?;
         self.staging.fill(&mut self.queue, &[Write { target, offset: 0, bytes: bytemuck::cast_slice(inputs) }])?;
         let resources = &self.resources;
-        let bound = self.variants.pipeline(&self.device, variant)?.bind(|binding| resources.bindable(binding))?;
+        let bound = self.pipelines.of(PipelineKey::computing(variant))?.bind(|binding| resources.bindable(binding))?;
         let groups = bound.workgroups([inputs.len() as u32, 1, 1]);
         self.queue.run("evaluating a function", |recorder| recorder.dispatch(&bound, groups))?;
         let results = resources.buffer(Resource::Outputs).ok_or_else(|| missing(Resource::Outputs))?;

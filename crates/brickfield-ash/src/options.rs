@@ -1,6 +1,7 @@
 //! Which adapter to use, and how.
 
 use std::fmt;
+use std::path::PathBuf;
 
 use brickfield_frame::AdapterKind;
 
@@ -18,11 +19,14 @@ pub struct Options {
     /// So much memory of the host, up to the next power of two and 64 KiB at least, each direction takes at most: a large set
     /// of bricks does not need its memory twice.
     pub copy_bytes: usize,
+    /// A file that keeps compiled pipelines from one process to the next: it is read if it is this device's and driver's and whole, and written
+    /// when the backend goes. Its folder must exist. None unless stated.
+    pub pipelines: Option<PathBuf>,
 }
 
 impl Default for Options {
     fn default() -> Options {
-        Options { adapter: AdapterChoice::Default, validation: Validation::Off, copy_bytes: 64 << 20 }
+        Options { adapter: AdapterChoice::Default, validation: Validation::Off, copy_bytes: 64 << 20, pipelines: None }
     }
 }
 

@@ -5,7 +5,7 @@ use std::time::Instant;
 use ash::vk;
 use brickfield_core::glam::UVec3;
 use brickfield_frame::{Fetch, Probe, RenderError, Resource, TextureReads, TextureWork};
-use brickfield_shaders::Variant;
+use brickfield_shaders::{PipelineKey, Variant};
 
 use crate::AshBackend;
 use crate::march::milliseconds_since;
@@ -25,15 +25,16 @@ impl Probe for AshBackend {
         self.staging.fill(&mut self.queue, &[Write { target, offset: 0, bytes }])?;
         let n_bytes = work.n_rays.element_product() as usize * size_of::<f32>();
         means.reserve(&self.device, n_bytes)?;
-        let bound = self.variants.pipeline(&self.device, Variant::probe(work.fetch))?.bind(|binding| match binding
-            .resource
-        {
-            Resource::Probe => uniforms.bindable(),
-            Resource::Atlas => Some(Bindable::Texture(&texture)),
-            Resource::AtlasSampler => Some(Bindable::Sampler(&sampler)),
-            Resource::Means => means.bindable(),
-            _ => None,
-        })?;
+        let bound =
+            self.pipelines.of(PipelineKey::computing(Variant::probe(work.fetch)))?.bind(|binding| {
+                match binding.resource {
+                    Resource::Probe => uniforms.bindable(),
+                    Resource::Atlas => Some(Bindable::Texture(&texture)),
+                    Resource::AtlasSampler => Some(Bindable::Sampler(&sampler)),
+                    Resource::Means => means.bindable(),
+                    _ => None,
+                }
+            })?;
         let groups = bound.workgroups([work.n_rays.x, work.n_rays.y, 1]);
         let (mut device_ms, mut wall_ms) = (Vec::new(), Vec::new());
         for _ in 0..n_runs {

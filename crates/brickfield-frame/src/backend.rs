@@ -40,10 +40,28 @@ pub trait Backend: Send {
         batches: &mut dyn Iterator<Item = FramePlan>,
     ) -> Result<Frame, RenderError>;
 
+    /// Which shaders draw the frames from now on. The cpu has none, and does not change.
+    fn choose_shaders(&mut self, choice: ShaderChoice) {
+        let _ = choice;
+    }
+
     /// The backend as one that evaluates single functions, if it is.
     fn as_evaluate(&mut self) -> Option<&mut dyn Evaluate> {
         None
     }
+}
+
+/// Which shader draws a frame. In exact mode the picture is the same, bit by bit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ShaderChoice {
+    /// The frame's own, with nothing that the frame does not need; a frame waits until it is compiled.
+    #[default]
+    Own,
+    /// The general one, which draws other transfer functions, levels and empty blocks as well.
+    General,
+    /// The frame's own, compiled on another thread; the general one until then, if that is there. When both are there they take turns
+    /// for some frames, and the quicker one stays. For viewers: an edit does not wait for a compiler.
+    Quickest,
 }
 
 /// Evaluates single functions of a renderer, so that each can be held against its equation.
@@ -118,24 +136,44 @@ pub struct Frame {
     pub timing: Timing,
     /// Bytes that were brought to the device for it: samples, index, numbers.
     pub uploaded_bytes: u64,
+    /// Whether a general shader drew it ([`ShaderChoice`]), or a batch of it.
+    pub is_general: bool,
 }
 
 impl Frame {
-    /// A frame for which nothing was uploaded.
-    pub fn new(image: Image<f32>, timing: Timing) -> Frame {
-        Frame { image, timing, uploaded_bytes: 0 }
+    /// A picture, and its cost.
+    pub fn new(image: Image<f32>, cost: Cost) -> Frame {
+        let Cost { timing, uploaded_bytes, is_general } = cost;
+        Frame { image, timing, uploaded_bytes, is_general }
+    }
+}
+
+/// The cost of a frame, or of a batch of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[allow(missing_docs)]
+pub struct Cost {
+    pub timing: Timing,
+    pub uploaded_bytes: u64,
+    pub is_general: bool,
+}
+
+impl Cost {
+    /// Rendering alone: nothing was uploaded.
+    pub fn of_rendering(wall_ms: f64) -> Cost {
+        Cost { timing: Timing { wall_ms, ..Timing::default() }, ..Cost::default() }
     }
 
-    /// The frame, for which so many bytes were brought to the device.
-    #[must_use]
-    pub fn with_upload(self, uploaded_bytes: u64) -> Frame {
-        Frame { uploaded_bytes, ..self }
+    fn and(self, next: Cost) -> Cost {
+        Cost {
+            timing: self.timing.and(&next.timing),
+            uploaded_bytes: self.uploaded_bytes + next.uploaded_bytes,
+            is_general: self.is_general || next.is_general,
+        }
     }
 }
 
 /// How long a frame took, in milliseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[non_exhaustive]
 pub struct Timing {
     /// Bringing bricks, index and transfer function to the device, and building the shader variant, if new.
     pub upload_ms: f64,
@@ -157,11 +195,6 @@ impl Timing {
             wall_ms: self.wall_ms + next.wall_ms,
             read_back_ms: self.read_back_ms + next.read_back_ms,
         }
-    }
-
-    /// Rendering alone, as the caller waits for it.
-    pub fn of_rendering(wall_ms: f64) -> Timing {
-        Timing { wall_ms, ..Timing::default() }
     }
 }
 
@@ -250,15 +283,27 @@ pub enum RenderError {
     Shader { message: String },
 }
 
-/// Whether a batch is of a frame of `size` pixels.
+/// Draws those batches of a frame that show anything, one after the other; `draw` is told whether a batch is the first. The cost of all;
+/// `None` if no batch shows anything.
 ///
 /// # Errors
-/// If its picture has another size.
-pub fn check_batch(plan: &FramePlan, size: UVec2) -> Result<(), RenderError> {
-    match plan.size() == size {
-        true => Ok(()),
-        false => Err(RenderError::BatchSize { batch: plan.size(), size }),
+/// A batch of another size than the frame's; a batch that is not drawn.
+pub fn draw_batches(
+    size: UVec2,
+    batches: &mut dyn Iterator<Item = FramePlan>,
+    mut draw: impl FnMut(&FramePlan, bool) -> Result<Cost, RenderError>,
+) -> Result<Option<Cost>, RenderError> {
+    let mut sum: Option<Cost> = None;
+    for plan in batches {
+        if plan.size() != size {
+            return Err(RenderError::BatchSize { batch: plan.size(), size });
+        }
+        if !plan.shows_nothing() {
+            let cost = draw(&plan, sum.is_none())?;
+            sum = Some(sum.map_or(cost, |sum| sum.and(cost)));
+        }
     }
+    Ok(sum)
 }
 
 /// Whether the host has memory for a picture.

@@ -22,7 +22,8 @@ mod value_scale;
 
 pub use adapter::AdapterKind;
 pub use backend::{
-    Backend, Capabilities, Description, Evaluate, Frame, RenderError, ShaderFunction, Timing, check_batch, check_memory,
+    Backend, Capabilities, Cost, Description, Evaluate, Frame, RenderError, ShaderChoice, ShaderFunction, Timing,
+    check_memory, draw_batches,
 };
 pub use brickfield_optics::QuadratureRule;
 pub use content::{Chunk, Chunked, ContentId, HeldChunks};

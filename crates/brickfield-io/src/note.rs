@@ -52,6 +52,8 @@ pub enum Note {
     PaletteIgnored,
     /// Chunks of an OME-Zarr, strips or tiles of a TIFF that are not stored; their voxels have the fill value (of TIFF: 0).
     MissingChunks { n_missing: u64, n_chunks: u64 },
+    /// A store that was packed, and whose samples were changed since: summaries of its blocks are not taken.
+    ChangedStore,
     /// Planes of an OME-TIFF that are in none of its files; their voxels are 0.
     MissingPlanes { n_missing: u64, n_planes: u64 },
     /// A volume of which slices were asked for, whose format is read whole.
@@ -96,6 +98,9 @@ impl fmt::Display for Note {
             Note::FirstOfAxis { axis, n_entries } => {
                 write!(f, "axis {axis:?} has {n_entries} entries; the first was read")
             }
+            Note::ChangedStore => f.write_str(
+                "samples were changed since the store was packed: its summaries of blocks are made anew, its coarse levels are taken as they are",
+            ),
             Note::Luminance => f.write_str("voxels have colours; their luminance was read"),
             Note::Converted { from, to } => write!(f, "values stored as {from} were read as {to}, all exactly"),
             Note::SpacingAssumed { axis, reason } => write!(f, "spacing {axis} {reason}; 1 is used"),

@@ -17,7 +17,7 @@ fn main() {
 const BUDGET: BlockBudget = BlockBudget {
     size: BudgetSize::Ratio(32.0),
     scalar: ScalarType::U16,
-    companion_bytes: 0,
+    sample_bytes: 1,
     one_sample: OneSampleBlocks::Stored,
 };
 

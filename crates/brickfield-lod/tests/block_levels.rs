@@ -3,10 +3,12 @@
 mod scene;
 
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Aabb, BlockLayout, BlockSide, Level, ScalarType};
+use brickfield_core::{
+    Aabb, BlockLayout, BlockSide, BlockSummary, Knot, Level, ScalarType, TransferFunction, ValueRange,
+};
 use brickfield_lod::{
     BlockBudget, BlockLevels, BlockSelection, BlockView, BudgetError, BudgetSize, Culling, Importance, LevelErrors,
-    OneSampleBlocks, block_weights, select_block_levels,
+    OneSampleBlocks, block_weights, select_block_levels, spend_rest,
 };
 use proptest::prelude::*;
 use scene::scene;
@@ -21,17 +23,12 @@ fn choices(layout: &BlockLayout, errors: &[LevelErrors], weights: &[f32], budget
         let choice = levels.map(|level| {
             let n = u64::from(layout.n_samples(block, level).element_product());
             let is_free = n == 1 && budget.one_sample == OneSampleBlocks::Free;
-            let bytes = if is_free { 0 } else { n * sample_bytes(budget) };
+            let bytes = if is_free { 0 } else { n * u64::from(budget.sample_bytes) };
             (bytes, f64::from(weights[i]) * n_voxels * f64::from(errors[i][usize::from(level.0)]))
         });
         choice.collect()
     };
     layout.blocks().enumerate().map(of_block).collect()
-}
-
-/// Bytes of a sample and its companions.
-fn sample_bytes(budget: &BlockBudget) -> u64 {
-    budget.scalar.n_bytes() as u64 + u64::from(budget.companion_bytes)
 }
 
 /// The least cost of all combinations within a budget; every number of bytes is a multiple of `unit`.
@@ -98,15 +95,15 @@ fn cases() -> impl Strategy<Value = Case> {
     let parts = layouts().prop_flat_map(|layout| {
         let n = layout.n_blocks_total();
         let weights = proptest::collection::vec(prop_oneof![Just(1.0f32), Just(0.0), 0.1f32..3.0], n);
-        (Just(layout), errors(n), weights, 0.0..1.1f64, (any::<bool>(), 0..4u8))
+        (Just(layout), errors(n), weights, 0.0..1.1f64, (any::<bool>(), 1..6u8))
     });
-    parts.prop_map(|(layout, errors, weights, part, (is_free, companion_bytes))| {
+    parts.prop_map(|(layout, errors, weights, part, (is_free, sample_bytes))| {
         let (scalar, n_blocks) = (ScalarType::U16, layout.n_blocks_total() as u64);
-        let of_sample = 2 + u64::from(companion_bytes);
+        let of_sample = u64::from(sample_bytes);
         let (least, whole) = (of_sample * n_blocks, of_sample * layout.dims().as_u64vec3().element_product());
         let size = BudgetSize::Bytes(least + ((whole - least.min(whole)) as f64 * part) as u64);
         let one_sample = if is_free { OneSampleBlocks::Free } else { OneSampleBlocks::Stored };
-        Case { layout, errors, weights, budget: BlockBudget { size, scalar, companion_bytes, one_sample } }
+        Case { layout, errors, weights, budget: BlockBudget { size, scalar, sample_bytes, one_sample } }
     })
 }
 
@@ -121,7 +118,7 @@ proptest! {
         let rounding = 1e-9 * blocks.iter().map(|c| c[0].1).sum::<f64>();
         prop_assert!(selection.n_bytes == n_bytes && n_bytes <= budget_bytes);
         prop_assert!((selection.cost - cost).abs() <= rounding, "{} {cost}", selection.cost);
-        let least = least_cost(&blocks, budget_bytes, sample_bytes(&budget));
+        let least = least_cost(&blocks, budget_bytes, u64::from(budget.sample_bytes));
         let step = blocks.iter().map(greatest_step).fold(0.0, f64::max);
         prop_assert!(least - rounding <= cost && cost <= least + step + rounding, "{cost}: {least} + {step}");
     }
@@ -156,7 +153,7 @@ fn layout() -> BlockLayout {
 }
 
 fn budget(size: BudgetSize) -> BlockBudget {
-    BlockBudget { size, scalar: ScalarType::U8, companion_bytes: 0, one_sample: OneSampleBlocks::Stored }
+    BlockBudget { size, scalar: ScalarType::U8, sample_bytes: 1, one_sample: OneSampleBlocks::Stored }
 }
 
 const FALLING: LevelErrors = [0.0, 1.0, 3.0, 7.0, 15.0, 0.0];
@@ -309,4 +306,58 @@ fn nearer_blocks_weigh_more() {
         |i: usize| 0.5 * grid.world_box().diagonal() / 20f64.to_radians().sin() - 128.0 + 8.0 + 16.0 * i as f64;
     let expected = (distance(15) / distance(0)).powi(2);
     assert!((f64::from(weights[0] / weights[15]) / expected - 1.0).abs() < 1e-5);
+}
+
+/// Blocks of 8 in a row, every fourth of which shows something; the variance of a block that does not rises along the row.
+fn row_of_blocks() -> (BlockLayout, Vec<BlockSummary>, TransferFunction) {
+    let layout = BlockLayout::new(UVec3::new(16 * 8, 8, 8), BlockSide::V8);
+    let summary = |i: u32| {
+        let (low, high) = if i.is_multiple_of(4) { (0.0, 200.0) } else { (0.0, 90.0) };
+        BlockSummary {
+            range: ValueRange { min: low, max: high },
+            mean: 40.0,
+            counts: [4095; 16],
+            kept_variance: [1.0, 0.7, 0.4, 0.0, 0.0, 0.0],
+            variance: if i == 1 { 0.0 } else { f64::from(i) },
+        }
+    };
+    let knot = |value, extinction| Knot { value, extinction, color: [1.0; 3] };
+    let transfer = TransferFunction::new(vec![knot(100.0, 0.0), knot(150.0, 0.1)]).unwrap();
+    (layout, (0..16).map(summary).collect(), transfer)
+}
+
+#[test]
+fn what_is_left_refines_transparent_blocks_beside_visible_ones() {
+    let (layout, summaries, transfer) = row_of_blocks();
+    let no_errors = vec![[0.0; 6]; 16];
+    let rest_of = |most: u64, one_sample, weights: Option<&[f32]>| {
+        let budget = BlockBudget { one_sample, ..budget(BudgetSize::Bytes(most)) };
+        let selection = select_block_levels(&layout, &no_errors, weights, &budget).unwrap();
+        let n_before = selection.n_bytes;
+        let rest = spend_rest(&layout, &summaries, &transfer, weights, &budget, selection).unwrap();
+        let is_refined = rest.levels.levels().iter().map(|level| *level < Level(3)).collect::<Vec<_>>();
+        let n_bytes: u64 = layout
+            .blocks()
+            .zip(rest.levels.levels())
+            .map(|(block, level)| {
+                let n = layout.n_samples_total(block, *level);
+                if n == 1 && one_sample == OneSampleBlocks::Free { 0 } else { n }
+            })
+            .sum();
+        assert!(rest.n_bytes == n_bytes && n_before <= n_bytes && n_bytes <= most, "{rest:?}");
+        (rest, is_refined)
+    };
+    // Beside visible blocks 0, 4, 8 and 12, and not of one value as block 1. The last one is beside none.
+    let beside: Vec<bool> = (0..16).map(|i| i % 4 != 0 && i % 4 != 2 && i != 1 && i != 15).collect();
+    for one_sample in [OneSampleBlocks::Free, OneSampleBlocks::Stored] {
+        let (rest, is_refined) = rest_of(1 << 20, one_sample, None);
+        assert_eq!(is_refined, beside);
+        assert!(rest.levels.levels().iter().zip(&beside).all(|(level, beside)| (*level == Level(0)) == *beside));
+        assert_eq!(rest_of(16, one_sample, None).0.levels, BlockLevels::uniform(layout, Level(3)));
+    }
+    // For one block of 512 samples: that of the greatest variance; and none without weight.
+    assert_eq!(rest_of(512, OneSampleBlocks::Free, None).1.iter().rposition(|refined| *refined), Some(13));
+    let weights: Vec<f32> = (0..16u8).map(|i| f32::from(u8::from(i < 6))).collect();
+    let (_, is_refined) = rest_of(1 << 20, OneSampleBlocks::Free, Some(&weights));
+    assert_eq!(is_refined, (0..16).map(|i| beside[i] && i < 6).collect::<Vec<_>>());
 }

@@ -3,13 +3,16 @@
 mod evaluate;
 mod library;
 mod passes;
+mod pipelines;
 mod reflect;
 mod specialise;
+mod trial;
 mod variant;
 
 pub use evaluate::{shader_inputs, shader_outputs};
 pub use library::{PatchError, ShaderLibrary};
 pub use passes::{n_rays_that_go_on, passes};
+pub use pipelines::{Chosen, PipelineKey, Pipelines};
 pub use reflect::{Binding, BindingKind};
 pub use specialise::{Counts, ShaderError, Specialised, specialise};
 pub use variant::{Entry, FieldKind, KnotSearch, Segments, Surfaces, Variant};

@@ -274,6 +274,30 @@ impl Variant {
         }
     }
 
+    /// The shader that draws the same picture, and those of other transfer functions, levels and empty blocks besides.
+    ///
+    /// What needs data of its own (dark regions, light, gradients, spreads) is as in `self`: a shader has no binding for data that a
+    /// plan does not bring. Of batches, bricks are lent in general.
+    #[must_use]
+    pub fn general(self) -> Variant {
+        let mut features =
+            self.features.with(Feature::SkipEmpty).with(Feature::MultiLevel).with(Feature::TransferLookup);
+        if matches!(self.field, FieldKind::Blocks(_) | FieldKind::Dense) {
+            features = features.with(Feature::ShortBlocks);
+        }
+        if self.field == FieldKind::Placed && self.features.contains(Feature::SkipDark) {
+            features = features.with(Feature::Lent);
+        }
+        let search = match self.search {
+            KnotSearch::Unrolled(_) => KnotSearch::Unrolled(KnotSearch::MOST_HALVINGS),
+            KnotSearch::Loop => KnotSearch::Loop,
+        };
+        match self.entry {
+            Entry::March | Entry::Proxy(_) => Variant { features, search, ..self },
+            Entry::Evaluate(_) | Entry::Probe(_) => self,
+        }
+    }
+
     /// The modules that are compiled, one for each path that several modules share.
     pub(crate) fn chosen_modules(self) -> [&'static str; 3] {
         let integrate = match self.segments.division {

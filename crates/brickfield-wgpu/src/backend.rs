@@ -1,21 +1,24 @@
 //! The backend: the replay of a plan.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use brickfield_core::Image;
 use brickfield_core::glam::UVec2;
 use brickfield_frame::{
-    Backend, Description, Evaluate, Feature, Frame, FramePlan, FrameUniforms, RenderError, Resource, SampleFormat,
-    ShaderFunction, Target, Timing, check_batch, check_memory,
+    Backend, Cost, Description, Evaluate, Feature, Frame, FramePlan, FrameUniforms, RenderError, Resource,
+    SampleFormat, ShaderChoice, ShaderFunction, Target, Timing, check_memory, draw_batches,
 };
-use brickfield_shaders::{Entry, ShaderLibrary, Variant, n_rays_that_go_on, passes, shader_inputs, shader_outputs};
+use brickfield_shaders::{
+    Entry, PipelineKey, Pipelines, ShaderLibrary, Variant, n_rays_that_go_on, passes, shader_inputs, shader_outputs,
+};
 use wgpu::{BufferUsages, Features};
 
 use crate::buffer::Reused;
 use crate::clock::{Clock, milliseconds_since};
 use crate::device::Device;
 use crate::picture::{self, Maker};
-use crate::pipeline::{Pipeline, Pipelines, Program};
+use crate::pipeline::{Pipeline, Program, pipelines};
 use crate::polygons::{Drawing, Polygons};
 use crate::resources::{Brought, Resources, missing};
 use crate::{AdapterChoice, OpenError, adapter};
@@ -25,8 +28,8 @@ use crate::{AdapterChoice, OpenError, adapter};
 /// On the device stay: the contents of the last plan, so that the next plan brings only the chunks that differ; the pipeline of each shader
 /// variant, the picture, and buffers that grow when they must.
 pub struct WgpuBackend {
-    pub(crate) device: Device,
-    pub(crate) pipelines: Pipelines,
+    pub(crate) device: Arc<Device>,
+    pub(crate) pipelines: Pipelines<Pipeline>,
     pub(crate) clock: Option<Clock>,
     resources: Resources,
     polygons: Polygons,
@@ -48,9 +51,9 @@ impl WgpuBackend {
     /// # Errors
     /// If there is none, not the one chosen, or if it gives no device. The message says which there are.
     pub fn new(choice: &AdapterChoice) -> Result<WgpuBackend, OpenError> {
-        let device = adapter::open(choice)?;
+        let device = Arc::new(adapter::open(choice)?);
         Ok(WgpuBackend {
-            pipelines: Pipelines::default(),
+            pipelines: pipelines(&device, ShaderLibrary::embedded()),
             clock: Clock::new(&device),
             resources: Resources::new(&device),
             polygons: Polygons::new(),
@@ -66,7 +69,9 @@ impl WgpuBackend {
     ///
     /// For conformance runs, which must notice a library that is wrong in one place.
     pub fn set_library(&mut self, library: ShaderLibrary) {
-        self.pipelines = Pipelines::new(library);
+        let choice = self.pipelines.choice();
+        self.pipelines = pipelines(&self.device, library);
+        self.pipelines.set_choice(choice);
     }
 
     fn check_size(&self, size: UVec2) -> Result<(), RenderError> {
@@ -99,10 +104,11 @@ impl WgpuBackend {
     fn march(
         &mut self,
         plan: &FramePlan,
+        key: PipelineKey,
         uniforms: FrameUniforms,
         is_first_batch: bool,
     ) -> Result<(Option<f64>, f64), RenderError> {
-        let pipeline = self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?;
+        let pipeline = &self.pipelines[key];
         let [x, y, _] = pipeline.workgroup_size;
         if pipeline.uses(Resource::SeenBefore) {
             let n_bytes = n_rays_that_go_on(plan, y) * size_of::<[f32; 4]>() as u64;
@@ -128,7 +134,7 @@ impl WgpuBackend {
         let n_bytes = size_of_val(inputs) as u64;
         self.resources.buffer(Resource::Inputs).write(&self.device, bytemuck::cast_slice(inputs))?;
         self.resources.buffer(Resource::Outputs).reserve(&self.device, n_bytes)?;
-        let pipeline = self.pipelines.of(&self.device, variant)?;
+        let pipeline = self.pipelines.of(PipelineKey::computing(variant))?;
         let groups = (inputs.len() as u32).div_ceil(pipeline.workgroup_size[0]);
         dispatch(&self.device, pipeline, &self.resources, [groups, 1, 1], None)?;
         self.outputs.read(&self.device, self.resources.buffer(Resource::Outputs), n_bytes)
@@ -147,24 +153,17 @@ impl Backend for WgpuBackend {
     ) -> Result<Frame, RenderError> {
         self.check_size(size)?;
         check_memory(size)?;
-        let (mut timing, mut n_bytes, mut is_first) = (Timing::default(), 0, true);
-        for plan in batches {
-            check_batch(&plan, size)?;
-            if plan.shows_nothing() {
-                continue;
-            }
-            let (of_batch, brought) = self.draw(&plan, is_first)?;
-            timing = if is_first { of_batch } else { timing.and(&of_batch) };
-            (n_bytes, is_first) = (n_bytes + brought, false);
-        }
-        if is_first {
-            return Ok(Frame::new(Image::transparent(size), timing));
-        }
+        let cost = draw_batches(size, batches, |plan, is_first| self.draw(plan, is_first))?;
+        let Some(mut cost) = cost else { return Ok(Frame::new(Image::transparent(size), Cost::default())) };
         let started = Instant::now();
         let picture = self.resources.picture.as_ref().ok_or_else(|| missing(Resource::Picture))?;
         let image = picture.read(&self.device, &mut self.staging)?;
-        timing.read_back_ms = milliseconds_since(started);
-        Ok(Frame::new(image, timing).with_upload(n_bytes))
+        cost.timing.read_back_ms = milliseconds_since(started);
+        Ok(Frame::new(image, cost))
+    }
+
+    fn choose_shaders(&mut self, choice: ShaderChoice) {
+        self.pipelines.set_choice(choice);
     }
 
     fn as_evaluate(&mut self) -> Option<&mut dyn Evaluate> {
@@ -173,19 +172,14 @@ impl Backend for WgpuBackend {
 }
 
 impl WgpuBackend {
-    /// Draws a batch, over those before it; how long it took, and the bytes that were brought to the device.
-    fn draw(&mut self, plan: &FramePlan, is_first: bool) -> Result<(Timing, u64), RenderError> {
+    /// Draws a batch, over those before it.
+    fn draw(&mut self, plan: &FramePlan, is_first: bool) -> Result<Cost, RenderError> {
         self.check_features(plan)?;
         self.check_blending(plan)?;
         let started = Instant::now();
         let maker = plan.proxy().map_or(Maker::Rays, |proxy| Maker::Polygons(proxy.target()));
-        let pipeline = match plan.proxy() {
-            None => self.pipelines.of(&self.device, Variant::of(plan, Entry::March))?,
-            Some(proxy) => {
-                let variant = Variant::of(plan, Entry::Proxy(proxy.slices()));
-                self.pipelines.blending_into(&self.device, variant, proxy.target())?
-            }
-        };
+        let chosen = self.pipelines.choose(PipelineKey::of(plan))?;
+        let pipeline = &self.pipelines[chosen.key];
         let Brought { uniforms, mut n_bytes } = self.resources.bring(&self.device, plan, pipeline)?;
         self.resources.resize(&self.device, plan.size(), maker)?;
         if let Some(proxy) = plan.proxy() {
@@ -195,16 +189,16 @@ impl WgpuBackend {
         self.device.wait("uploading")?;
         let upload_ms = milliseconds_since(started);
         let (device_ms, wall_ms) = match plan.proxy() {
-            None => self.march(plan, uniforms, is_first)?,
+            None => self.march(plan, chosen.key, uniforms, is_first)?,
             Some(proxy) => {
                 let drawing =
                     Drawing { device: &self.device, pipeline, resources: &self.resources, clock: self.clock.as_ref() };
                 self.polygons.draw(&drawing, proxy, is_first)?
             }
         };
-        let mut timing = Timing::of_rendering(wall_ms);
-        (timing.upload_ms, timing.device_ms) = (upload_ms, device_ms);
-        Ok((timing, n_bytes))
+        self.pipelines.note(chosen, device_ms.unwrap_or(wall_ms));
+        let timing = Timing { upload_ms, device_ms, wall_ms, read_back_ms: 0.0 };
+        Ok(Cost { timing, uploaded_bytes: n_bytes, is_general: chosen.is_general() })
     }
 }
 
@@ -217,7 +211,7 @@ impl Evaluate for WgpuBackend {
     ) -> Result<Vec<[f32; 4]>, RenderError> {
         self.check_features(plan)?;
         let variant = Variant::of(plan, Entry::Evaluate(function));
-        let pipeline = self.pipelines.of(&self.device, variant)?;
+        let pipeline = self.pipelines.of(PipelineKey::computing(variant))?;
         self.resources.bring(&self.device, plan, pipeline)?;
         let mut results = Vec::with_capacity(inputs.len());
         for some in shader_inputs(plan, function, inputs).chunks(EVALUATED_AT_ONCE) {

@@ -1,10 +1,10 @@
 //! Shader variants as pipelines.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::sync::Arc;
 
 use brickfield_frame::{ProxyCorner, RenderError, Resource, Target};
-use brickfield_shaders::{Binding, BindingKind, Entry, ShaderLibrary, Specialised, Variant};
+use brickfield_shaders::{Binding, BindingKind, Entry, PipelineKey, Pipelines, ShaderLibrary, Specialised};
 
 use crate::device::Device;
 use crate::picture::format;
@@ -23,38 +23,10 @@ pub(crate) enum Program {
     Polygons(wgpu::RenderPipeline),
 }
 
-/// The pipelines built so far.
-#[derive(Default)]
-pub(crate) struct Pipelines {
-    library: ShaderLibrary,
-    /// The target is that of polygons.
-    built: HashMap<(Variant, Target), Pipeline>,
-}
-
-impl Pipelines {
-    pub(crate) fn new(library: ShaderLibrary) -> Pipelines {
-        Pipelines { library, built: HashMap::new() }
-    }
-
-    /// The pipeline of a variant, built if it is new.
-    pub(crate) fn of(&mut self, device: &Device, variant: Variant) -> Result<&Pipeline, RenderError> {
-        self.blending_into(device, variant, Target::default())
-    }
-
-    /// The pipeline of a variant that blends polygons into a target.
-    pub(crate) fn blending_into(
-        &mut self,
-        device: &Device,
-        variant: Variant,
-        target: Target,
-    ) -> Result<&Pipeline, RenderError> {
-        let key = (variant, target);
-        if !self.built.contains_key(&key) {
-            let pipeline = build(device, &self.library, &variant, target)?;
-            self.built.insert(key, pipeline);
-        }
-        Ok(&self.built[&key])
-    }
+/// The pipelines of a device, none yet.
+pub(crate) fn pipelines(device: &Arc<Device>, library: ShaderLibrary) -> Pipelines<Pipeline> {
+    let device = Arc::clone(device);
+    Pipelines::new(move |key| build(&device, &library, key))
 }
 
 impl Pipeline {
@@ -64,10 +36,10 @@ impl Pipeline {
     }
 }
 
-fn build(device: &Device, library: &ShaderLibrary, variant: &Variant, target: Target) -> Result<Pipeline, RenderError> {
-    let shader = library.specialise_within(variant, device.description.capabilities.max_storage_buffers)?;
+fn build(device: &Device, library: &ShaderLibrary, key: &PipelineKey) -> Result<Pipeline, RenderError> {
+    let shader = library.specialise_within(&key.variant, device.description.capabilities.max_storage_buffers)?;
     let n_bytes = shader.wgsl.len() as u64;
-    device.checked("building a shader variant", n_bytes, || from_shader(&device.device, shader, target))
+    device.checked("building a shader variant", n_bytes, || from_shader(&device.device, shader, key.target))
 }
 
 fn from_shader(device: &wgpu::Device, shader: Specialised, target: Target) -> Pipeline {

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use brickfield_frame::{Fetch, Probe, RenderError, Resource, SampleFormat, TextureReads, TextureWork};
-use brickfield_shaders::{Binding, Variant};
+use brickfield_shaders::{Binding, PipelineKey, Variant};
 use wgpu::{BufferUsages, Features};
 
 use crate::WgpuBackend;
@@ -27,7 +27,7 @@ impl Probe for WgpuBackend {
         );
         uniforms.write(device, bytemuck::bytes_of(&work.uniforms()))?;
         means.reserve(device, u64::from(work.n_rays.element_product()) * size_of::<f32>() as u64)?;
-        let pipeline = self.pipelines.of(device, Variant::probe(work.fetch))?;
+        let pipeline = &*self.pipelines.of(PipelineKey::computing(Variant::probe(work.fetch)))?;
         let group = bind(device, pipeline, &texture, [&uniforms, &means])?;
         let (mut device_ms, mut wall_ms) = (Vec::new(), Vec::new());
         for _ in 0..n_runs {

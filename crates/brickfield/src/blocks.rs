@@ -3,7 +3,9 @@
 use brickfield_bricks::{BlockSource, FetchError};
 use brickfield_core::glam::UVec3;
 use brickfield_core::{Aabb, BlockLayout, BlockSide, Companion, Level, Projection, TransferFunction, ValueRange};
-use brickfield_frame::{Drawing, FramePlan, IndexEntry, Join, Lighting, PlanError, PlanParts, QuadratureRule, Slices};
+use brickfield_frame::{
+    Drawing, FramePlan, IndexEntry, Join, Lighting, PlanError, PlanParts, QuadratureRule, SampleFormat, Slices,
+};
 use brickfield_optics::Normals;
 use rayon::prelude::*;
 
@@ -107,9 +109,11 @@ pub fn prepare_blocks(
     Ok(FramePlan::new(PlanParts { lighting, drawing, ..parts })?)
 }
 
-/// The bytes that each sample of flat blocks takes besides its value: those of a [`BlockBudget`](brickfield_lod::BlockBudget).
-pub fn companion_bytes(scene: &Scene, classification: Classification) -> u8 {
-    companions(scene, classification).map(|companion| companion.n_bytes() as u8).sum()
+/// The bytes that each sample of flat blocks takes on a device, with its companions: those of a [`BlockBudget`](brickfield_lod::BlockBudget).
+/// Voxels of 64 bits take four.
+pub fn sample_bytes(source: &dyn BlockSource, scene: &Scene, classification: Classification) -> u8 {
+    let companions = companions(scene, classification).map(|companion| companion.n_bytes());
+    (SampleFormat::of(source.scalar_type()).n_bytes() + companions.sum::<usize>()) as u8
 }
 
 /// The companions of samples that a frame needs. Where all values look alike, spreads change nothing; nor where all samples are voxels.
@@ -270,9 +274,9 @@ mod tests {
         assert!(stored.features().contains(Feature::StoredGradients));
         let central = plan(Normals::Central);
         assert!(central.gradients().is_none() && central.field().companions(Companion::Gradient).is_none());
-        let bytes = |normals| companion_bytes(&on(normals), Classification::OfMean);
-        assert_eq!((bytes(Normals::Stored), bytes(Normals::Central)), (4, 0));
-        assert_eq!(companion_bytes(&on(Normals::Stored), Classification::Prefiltered), 5);
+        let bytes = |normals| sample_bytes(&source, &on(normals), Classification::OfMean);
+        assert_eq!((bytes(Normals::Stored), bytes(Normals::Central)), (6, 2));
+        assert_eq!(sample_bytes(&source, &on(Normals::Stored), Classification::Prefiltered), 7);
         let tree = build_tree(source.volume(), &BuildOptions::default()).unwrap();
         let refused = crate::prepare(&tree, &on(Normals::Stored), &mut crate::Residency::default());
         assert_eq!(refused.err(), Some(PrepareError::Plan(PlanError::NoGradients)));

@@ -28,7 +28,7 @@ pub use batches::{
     CacheCounts, CacheError, CacheOptions, Eviction, TrimBatches, TrimCache, prepare_trimmed_batches, render_ahead,
 };
 pub use block_residency::BlockResidency;
-pub use blocks::{BlockStyle, Classification, PrepareBlocksError, TransparentBlocks, companion_bytes, prepare_blocks};
+pub use blocks::{BlockStyle, Classification, PrepareBlocksError, TransparentBlocks, prepare_blocks, sample_bytes};
 pub use brickfield_bricks as bricks;
 pub use brickfield_core as core;
 pub use brickfield_cpu as cpu;

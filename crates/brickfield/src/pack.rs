@@ -140,12 +140,12 @@ fn write(
     Ok(writer.finish()?)
 }
 
-/// What the stored numbers are, of volumes whose samples in the store depend on all of them.
+/// What stored numbers are, of volumes whose samples depend on all of them.
 #[derive(Clone, Copy, Debug, Default)]
-struct Survey {
+pub(crate) struct Survey {
     /// Of the finite ones.
     range: Option<ValueRange>,
-    non_finite: NonFinite,
+    pub(crate) non_finite: NonFinite,
     /// Values that f32 does not hold exactly.
     n_inexact: u64,
 }
@@ -163,7 +163,7 @@ impl Survey {
         }
     }
 
-    fn add<T: Scalar>(&mut self, voxels: &[T], rescale: Rescale) {
+    pub(crate) fn add<T: Scalar>(&mut self, voxels: &[T], rescale: Rescale) {
         for stored in voxels.iter().map(|v| v.to_f64()) {
             if !stored.is_finite() {
                 self.add_non_finite(stored);
@@ -175,6 +175,15 @@ impl Survey {
             range.min = range.min.min(stored);
             range.max = range.max.max(stored);
         }
+    }
+
+    /// Least and greatest finite number, if there are others.
+    pub(crate) fn finite(&self) -> Option<ValueRange> {
+        (self.non_finite.total() > 0).then(|| self.finite_or_zero())
+    }
+
+    fn finite_or_zero(&self) -> ValueRange {
+        self.range.unwrap_or(ValueRange { min: 0.0, max: 0.0 })
     }
 
     fn add_non_finite(&mut self, stored: f64) {
@@ -199,8 +208,7 @@ struct Values {
 impl Values {
     fn new(path: &Path, facts: &VolumeFacts, survey: &Survey) -> Result<Values, PackError> {
         let rescale = facts.rescale;
-        let stored = survey.range.unwrap_or(ValueRange { min: 0.0, max: 0.0 });
-        let range = rescale.values(stored);
+        let range = rescale.values(survey.finite_or_zero());
         if !(range.min.is_finite() && range.max.is_finite()) {
             return Err(PackError::BeyondFinite { path: path.to_owned(), rescale, range });
         }
@@ -209,7 +217,7 @@ impl Values {
             false if survey.n_inexact == 0 => ScalarType::F32,
             false => ScalarType::F64,
         };
-        Ok(Values { scalar, rescale, finite: (survey.non_finite.total() > 0).then_some(stored) })
+        Ok(Values { scalar, rescale, finite: survey.finite() })
     }
 
     /// The samples of stored numbers.

@@ -9,9 +9,9 @@ use brickfield_core::{
     with_voxels,
 };
 use brickfield_io::ome_zarr::ZarrLevels;
-use brickfield_io::{Limits, OpenError, OpenOptions, ReadError, VolumeFacts};
+use brickfield_io::{Limits, Note, OpenError, OpenOptions, ReadError, VolumeFacts};
 
-use crate::pack::finite_for;
+use crate::pack::{Survey, finite_for};
 
 /// How much memory a store may take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,8 +56,8 @@ pub struct StoreBlocks {
     range: ValueRange,
     /// Whether coarse samples may leave the range of the voxels: those of others, and f64 by its rounding.
     is_clamped: bool,
-    /// Least and greatest finite voxel, if there are voxels that are not finite.
-    finite: Option<ValueRange>,
+    /// Of another's floats; least and greatest finite voxel take the place of those that are not finite.
+    survey: Survey,
 }
 
 /// How far the summaries of a store's blocks are computed.
@@ -104,15 +104,15 @@ impl StoreBlocks {
         check_summaries(&layout, limits)?;
         let stated = levels.block_summaries(side)?;
         let is_clamped = stated.is_none() || levels.facts().scalar == ScalarType::F64;
-        let (summaries, finite) = match stated {
-            Some(summaries) => (summaries, None),
+        let (summaries, survey) = match stated {
+            Some(summaries) => (summaries, Survey::default()),
             None => summarised(&levels, &layout, progress)?,
         };
         let ranges = summaries.iter().map(|summary| summary.range);
         let range = ranges.reduce(ValueRange::union).unwrap_or(ValueRange { min: 0.0, max: 0.0 });
         let from = side.levels().map(|level| finest_above(&levels, level)).collect();
         let (id, path) = (SourceId::unique(), path.to_owned());
-        Ok(StoreBlocks { id, path, layout, levels, from, summaries, range, is_clamped, finite })
+        Ok(StoreBlocks { id, path, layout, levels, from, summaries, range, is_clamped, survey })
     }
 
     /// The store's folder.
@@ -144,6 +144,12 @@ impl StoreBlocks {
     /// store is an error.
     pub fn n_missing_chunks(&self) -> u64 {
         self.levels.n_missing_chunks()
+    }
+
+    /// That voxels of another's store are not finite, and what takes their place; `None` if all are.
+    pub fn note(&self) -> Option<Note> {
+        let ValueRange { min: low, max: high } = self.survey.finite()?;
+        Some(Note::NonFinite { counts: self.survey.non_finite, low, high })
     }
 
     /// The volume at the finest level of the store that takes no more than `max_bytes`; if none does, the voxels' mean in each block.
@@ -178,7 +184,7 @@ impl StoreBlocks {
         let shifts = self.levels.shifts(from).unwrap_or(UVec3::ZERO);
         let n = ((extent - 1) >> shifts) + 1;
         let samples = self.levels.box_voxels(from, first >> shifts, n)?;
-        let samples = match self.finite {
+        let samples = match self.survey.finite() {
             Some(range) => replaced(&samples, range),
             None => samples,
         };
@@ -193,7 +199,7 @@ impl StoreBlocks {
         let shifts = self.levels.shifts(self.from[usize::from(level.0)]).unwrap_or(UVec3::ZERO);
         let n = ((self.layout.extent(block) - 1) >> shifts) + 1;
         let is_in_range = level == Level(0) || !self.is_clamped;
-        n == self.layout.n_samples(block, level) && is_in_range && self.finite.is_none()
+        n == self.layout.n_samples(block, level) && is_in_range && self.survey.finite().is_none()
     }
 }
 
@@ -264,46 +270,38 @@ fn finest_above(levels: &ZarrLevels, level: Level) -> usize {
 /// Slices that are summarised at once: a layer of the largest blocks.
 const SLAB_SLICES: u32 = 32;
 
-/// The summaries of all blocks, from their voxels; and the range of the finite ones, if there are others.
+/// The summaries of all blocks, from their voxels; and what these are.
 fn summarised(
     levels: &ZarrLevels,
     layout: &BlockLayout,
     progress: &mut dyn FnMut(SummaryProgress),
-) -> Result<(Vec<BlockSummary>, Option<ValueRange>), ReadError> {
+) -> Result<(Vec<BlockSummary>, Survey), ReadError> {
     let dims = layout.dims();
     let is_float = matches!(levels.facts().scalar, ScalarType::F32 | ScalarType::F64);
-    let finite = if is_float { finite_range(levels, dims)? } else { None };
+    let survey = if is_float { surveyed(levels, dims)? } else { Survey::default() };
     let mut summaries = Vec::with_capacity(layout.n_blocks_total());
     for z in (0..dims.z).step_by(SLAB_SLICES as usize) {
         let extent = dims.with_z(SLAB_SLICES.min(dims.z - z));
         let mut slab = levels.box_voxels(0, UVec3::new(0, 0, z), extent)?;
-        if let Some(range) = finite {
+        if let Some(range) = survey.finite() {
             slab = replaced(&slab, range);
         }
         let of_slab = block_summaries(&slab, extent, layout.side(), levels.facts().rescale);
         summaries.extend(of_slab.expect("a box has its samples"));
         progress(SummaryProgress { n_done: z + extent.z, n_total: dims.z });
     }
-    Ok((summaries, finite))
+    Ok((summaries, survey))
 }
 
-/// The range of the finite voxels; `None` if all are finite.
-fn finite_range(levels: &ZarrLevels, dims: UVec3) -> Result<Option<ValueRange>, ReadError> {
-    let (mut range, mut n_others) = (None::<ValueRange>, 0u64);
+/// The voxels of floats, which may not be finite.
+fn surveyed(levels: &ZarrLevels, dims: UVec3) -> Result<Survey, ReadError> {
+    let mut survey = Survey::default();
     for z in (0..dims.z).step_by(SLAB_SLICES as usize) {
         let extent = dims.with_z(SLAB_SLICES.min(dims.z - z));
         let slab = levels.box_voxels(0, UVec3::new(0, 0, z), extent)?;
-        with_voxels!(&slab, v => for number in v.iter().map(|v| v.to_f64()) {
-            match number.is_finite() {
-                true => {
-                    let one = ValueRange { min: number, max: number };
-                    range = Some(range.map_or(one, |range| range.union(one)));
-                }
-                false => n_others += 1,
-            }
-        });
+        with_voxels!(&slab, v => survey.add(v, Rescale::IDENTITY));
     }
-    Ok((n_others > 0).then(|| range.unwrap_or(ValueRange { min: 0.0, max: 0.0 })))
+    Ok(survey)
 }
 
 /// The samples with finite ones in the place of others.

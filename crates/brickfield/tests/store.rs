@@ -146,10 +146,43 @@ fn voxels_that_are_not_finite_are_replaced_as_in_a_volume() {
     let counts = volume.non_finite();
     assert_eq!(packed.facts.notes, [Note::NonFinite { counts, low: 0.0, high: 999.0 }]);
     assert_same(&store(folder.path(), BlockSide::V16), &blocks(&volume, BlockSide::V16), 0.0);
+    assert_eq!(store(folder.path(), BlockSide::V16).note(), None);
     // Those in a store of somebody else, too.
     fs::remove_dir_all(&store_path).unwrap();
     others_store(&store_path, DIMS, &values, &[]);
     assert_same(&store(folder.path(), BlockSide::V16), &blocks(&volume, BlockSide::V16), 1e-3);
+    assert_eq!(store(folder.path(), BlockSide::V16).note(), Some(Note::NonFinite { counts, low: 0.0, high: 999.0 }));
+}
+
+/// A packed store, and the notes with which it is opened after its arrays `names` were taken from another store.
+fn after_an_edit(folder: &Path, names: &[&str]) -> (StoreBlocks, Vec<Note>) {
+    let [first, second] = ["first", "second"].map(|name| folder.join(name));
+    for (part, values) in [(&first, noise(DIMS, ScalarType::U8)), (&second, Voxels::U8(vec![9; 70 * 37 * 67]))] {
+        fs::create_dir_all(part).unwrap();
+        packed(part, &Volume::new(grid(DIMS), values).unwrap(), "nrrd");
+    }
+    for name in names {
+        let [to, from] = [&first, &second].map(|part| part.join("store.zarr").join(name));
+        fs::remove_dir_all(&to).unwrap();
+        fs::rename(from, to).unwrap();
+    }
+    let found = store(&first, BlockSide::V16);
+    let notes = found.facts().notes.clone();
+    (found, notes)
+}
+
+#[test]
+fn summaries_of_other_samples_are_not_taken() {
+    let folders = [(); 4].map(|()| tempfile::tempdir().unwrap());
+    let (found, notes) = after_an_edit(folders[0].path(), &[]);
+    assert_eq!((found.range(), notes), (ValueRange { min: 0.0, max: 255.0 }, vec![]));
+    let nine = ValueRange { min: 9.0, max: 9.0 };
+    let (found, notes) = after_an_edit(folders[1].path(), &["0", "1", "2", "3", "4", "5"]);
+    assert_eq!((found.range(), notes), (nine, vec![Note::ChangedStore]));
+    assert!(found.summaries().iter().all(|summary| summary.mean == 9.0 && summary.range == nine));
+    // The finest level alone, and the coarsest alone: those may be one byte.
+    assert_eq!(after_an_edit(folders[2].path(), &["0"]).1, [Note::ChangedStore]);
+    assert_eq!(after_an_edit(folders[3].path(), &["5"]).1, [Note::ChangedStore]);
 }
 
 /// OME-Zarr 0.4 of f32 with chunks of 20 samples a side; each further level halves some axes.

@@ -8,7 +8,7 @@ use std::process::{Command, ExitCode};
 use anyhow::{Context, Result, bail, ensure};
 use brickfield::io::{Format, detect};
 use brickfield::options::{FinestVoxels, InputOptions, SamplingOptions, Subject, TreeOptions, ViewOptions};
-use brickfield::{BackendKind, Residency, Validation, open_backend, prepare, write_picture};
+use brickfield::{BackendKind, Classification, Residency, Validation, open_backend, prepare, write_picture};
 use clap::Parser;
 use comfy_table::{Table, presets::NOTHING};
 use image::{GenericImage, Rgba, RgbaImage};
@@ -100,7 +100,11 @@ fn render(path: &Path, side: u32, picture: &Path) -> Result<()> {
     let size = format!("{side}x{side}");
     let options = Unstated::try_parse_from(["sheet", "--size", &size])?;
     let subject = Subject::open(path, &options.input, &options.tree, &options.view)?;
-    let scene = options.sampling.of(options.view.scene(&subject)?, Some(FinestVoxels::Volume(&subject.volume)))?;
+    let scene = options.sampling.of(
+        options.view.scene(&subject)?,
+        FinestVoxels::Volume(&subject.volume),
+        Classification::OfMean,
+    )?;
     let plan = prepare(&subject.tree, &scene, &mut Residency::default())?;
     let frame = open_backend(BackendKind::Cpu, None, Validation::Off)?.render(&plan)?;
     Ok(write_picture(picture, &frame.image, options.view.background.0, &[])?)

@@ -1,17 +1,18 @@
 //! What a scene's shader leaves out, and what that saves: the specialised shader next to the general one, which has everything that the
 //! scene's data allow.
 
+mod edits;
 mod scenes;
 
 use std::path::PathBuf;
 
-use brickfield::frame::{Backend, Feature, FeatureSet, FramePlan, Places, SpoiltPlan};
+use brickfield::frame::{Backend, FramePlan, ShaderChoice};
 use brickfield::open_backend;
 use brickfield::options::values;
 use brickfield::{BackendKind, Validation};
 use brickfield_core::Image;
 use brickfield_core::glam::UVec2;
-use brickfield_shaders::{Entry, ShaderLibrary, Variant};
+use brickfield_shaders::{PipelineKey, ShaderLibrary, Variant};
 use clap::Parser;
 use serde::Serialize;
 
@@ -19,7 +20,8 @@ use crate::compare::rivals::RivalArgs;
 use crate::metrics::{greatest_difference, median};
 use crate::paper::{PaperError, device_bytes, frame_of, mib, print, write_rows};
 use crate::turns::{Ratio, take_turns};
-use scenes::scenes;
+use edits::{EditsRow, edits};
+use scenes::{edited, scenes};
 
 /// The shader of each of a dozen scenes next to the general one: code, bindings, bytes, pipelines, time; equal pictures
 ///
@@ -77,6 +79,7 @@ struct Code {
     spirv_bytes: usize,
 }
 
+const CHOICES: [ShaderChoice; 2] = [ShaderChoice::Own, ShaderChoice::General];
 /// Pictures of two shaders may differ by this much where a compiler contracts their sums in other ways.
 const ROUNDING: f64 = 1e-6;
 
@@ -88,8 +91,8 @@ pub fn left_out(args: &LeftOutArgs) -> Result<Vec<String>, PaperError> {
     std::fs::create_dir_all(&args.out).map_err(|source| PaperError::Out { path: args.out.clone(), source })?;
     let mut rivals = args.rivals.open()?;
     print(&format!(
-        "{} x {} pixels, exact. Specialised / general: the shader of the scene, and one with every feature that the scene's data allow. Pipeline: the first frame over the\n\
-         others, the samples being there. Ratio: specialised over general, median of {} rounds in which both took turns.\n",
+        "{} x {} pixels, exact. Specialised / general: the shader of the scene, and one that draws other transfer functions, levels and empty blocks of its data. Pipeline: the first\n\
+         frame over the others, the samples being there. Ratio: specialised over general, median of {} rounds in which both took turns.\n",
         args.size.x, args.size.y, args.frames
     ))?;
     let library = ShaderLibrary::embedded();
@@ -98,13 +101,12 @@ pub fn left_out(args: &LeftOutArgs) -> Result<Vec<String>, PaperError> {
         if args.only.as_ref().is_some_and(|text| !scene.name.contains(text.as_str())) {
             continue;
         }
-        let plans = [scene.plan.clone(), general(&scene.plan)];
         let sum = brickfield::cpu::discrete(&scene.complete);
         let n_samples = (sum.n_samples, sum.n_visible_samples);
         // Shaders are those of GPU backends.
         for backend in rivals.present.iter_mut().filter(|backend| backend.describe().backend != BackendKind::Cpu.name())
         {
-            let row = of_scene(args, backend.as_mut(), &library, (scene.name, n_samples), &plans)?;
+            let row = of_scene(args, backend.as_mut(), &library, (scene.name, n_samples), &scene.plan)?;
             print(&line(&row))?;
             // NaN is a difference, too.
             let is_alike = row.difference <= ROUNDING;
@@ -115,30 +117,14 @@ pub fn left_out(args: &LeftOutArgs) -> Result<Vec<String>, PaperError> {
         }
     }
     write_rows(&args.out.join("left-out.json"), &rows)?;
+    if args.only.as_ref().is_none_or(|text| "edits".contains(text.as_str())) {
+        let names = rivals.present.iter().map(|backend| backend.describe().backend);
+        let names: Vec<_> = names.filter(|name| *name != BackendKind::Cpu.name()).collect();
+        let rows = edits(args, &names, &edited(args.size)?)?;
+        complaints.extend(rows.iter().filter_map(EditsRow::complaint));
+        write_rows(&args.out.join("edits.json"), &rows)?;
+    }
     Ok(complaints)
-}
-
-/// The plan with every feature that its data allow. Features that change the picture, and those whose data it lacks, stay as they are: a
-/// headlight has no place.
-fn general(plan: &FramePlan) -> FramePlan {
-    let is_of_blocks = matches!(plan.field().slots().places(), Places::Blocks(_));
-    let is_allowed = |feature: &Feature| match feature {
-        Feature::SkipEmpty | Feature::MultiLevel | Feature::TransferLookup => true,
-        Feature::ShortBlocks => is_of_blocks,
-        Feature::Lent => plan.kept().is_some(),
-        Feature::HardwareFilter
-        | Feature::EarlyTermination
-        | Feature::SkipDark
-        | Feature::SkipBesideBeams
-        | Feature::Light
-        | Feature::LightBesideEye
-        | Feature::StoredGradients
-        | Feature::Prefiltered => false,
-    };
-    let mut spoilt = SpoiltPlan::of(plan);
-    let more = Feature::ALL.into_iter().filter(is_allowed);
-    spoilt.features = more.fold(plan.features(), FeatureSet::with);
-    spoilt.into_plan()
 }
 
 fn of_scene(
@@ -146,21 +132,27 @@ fn of_scene(
     backend: &mut dyn Backend,
     library: &ShaderLibrary,
     (scene, (n_samples, n_visible_samples)): (&'static str, (u64, u64)),
-    plans: &[FramePlan; 2],
+    plan: &FramePlan,
 ) -> Result<LeftOutRow, PaperError> {
     let mut pictures: [Option<Image<f32>>; 2] = [None, None];
     let ms = take_turns::<PaperError>(2, args.frames, |turn| {
         let begin = std::time::Instant::now();
-        let frame = frame_of(backend, &plans[turn.contestant])?;
+        backend.choose_shaders(CHOICES[turn.contestant]);
+        let frame = frame_of(backend, plan)?;
         pictures[turn.contestant] = Some(frame.image);
         Ok(begin.elapsed().as_secs_f64() * 1e3)
     })?;
     let [own, general] = pictures.map(|picture| picture.expect("both had their turns"));
     let medians = [median(ms[0].clone()), median(ms[1].clone())];
     let name = backend.describe().backend;
-    let first = [first_frame(args, name, [&plans[1], &plans[0]])?, first_frame(args, name, [&plans[0], &plans[1]])?];
-    let code = |plan: &FramePlan| -> Result<Code, PaperError> {
-        let shader = library.specialise(&Variant::of(plan, entry(plan)))?;
+    let [own_choice, general_choice] = CHOICES;
+    let first = [
+        first_frame(args, name, plan, [general_choice, own_choice])?,
+        first_frame(args, name, plan, [own_choice, general_choice])?,
+    ];
+    let key = PipelineKey::of(plan);
+    let code = |variant: &Variant| -> Result<Code, PaperError> {
+        let shader = library.specialise(variant)?;
         Ok(Code {
             bindings: shader.bindings.iter().map(|binding| binding.resource.name()).collect(),
             n_functions: shader.counts.functions,
@@ -170,9 +162,9 @@ fn of_scene(
     Ok(LeftOutRow {
         scene,
         backend: name,
-        specialised: code(&plans[0])?,
-        general: code(&plans[1])?,
-        device_bytes: device_bytes(&plans[0]),
+        specialised: code(&key.variant)?,
+        general: code(&key.general().variant)?,
+        device_bytes: device_bytes(plan),
         n_samples,
         n_visible_samples,
         pipeline_ms: [0, 1].map(|i| (first[i] - medians[i]).max(0.0)),
@@ -183,19 +175,26 @@ fn of_scene(
     })
 }
 
-fn entry(plan: &FramePlan) -> Entry {
-    plan.proxy().map_or(Entry::March, |proxy| Entry::Proxy(proxy.slices()))
-}
-
-/// Milliseconds of the second plan's first frame, on a backend that has rendered the first one alone.
-fn first_frame(args: &LeftOutArgs, name: &str, [before, plan]: [&FramePlan; 2]) -> Result<f64, PaperError> {
-    let kind: BackendKind = name.parse().expect("a backend's own name");
-    let opened = open_backend(kind, args.rivals.adapter.as_deref(), Validation::Off);
-    let mut backend = opened.map_err(|source| PaperError::Reopen { source })?;
-    frame_of(backend.as_mut(), before)?;
+/// Milliseconds of the first frame with the second choice, on a backend that has rendered with the first one alone.
+fn first_frame(
+    args: &LeftOutArgs,
+    name: &str,
+    plan: &FramePlan,
+    [before, choice]: [ShaderChoice; 2],
+) -> Result<f64, PaperError> {
+    let mut backend = open(args, name)?;
+    backend.choose_shaders(before);
+    frame_of(backend.as_mut(), plan)?;
+    backend.choose_shaders(choice);
     let begin = std::time::Instant::now();
     frame_of(backend.as_mut(), plan)?;
     Ok(begin.elapsed().as_secs_f64() * 1e3)
+}
+
+/// A backend by its own name, as if nothing had been drawn yet.
+fn open(args: &LeftOutArgs, name: &str) -> Result<Box<dyn Backend>, PaperError> {
+    let kind: BackendKind = name.parse().expect("a backend's own name");
+    open_backend(kind, args.rivals.adapter.as_deref(), Validation::Off).map_err(|source| PaperError::Reopen { source })
 }
 
 fn line(row: &LeftOutRow) -> String {

@@ -13,6 +13,7 @@ use brickfield::{
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Aabb, BlockSide, BrickSide, Interblock, Level, TransferFunction};
 
+use super::edits::finer_and_finer;
 use crate::paper::PaperError;
 use crate::volumes::phantom;
 
@@ -85,6 +86,14 @@ impl Stage {
         let complete = Scene { skipping: Skipping::Off, technique: Technique::RayCasting, ..scene.clone() };
         Ok(LeftOutScene { name, plan: plan(&scene)?, complete: plan(&complete)? })
     }
+}
+
+/// A scene before and after edits of its transfer function, each of which needs another shader.
+pub(super) fn edited(size: UVec2) -> Result<Vec<FramePlan>, PaperError> {
+    let stage = Stage::new(size)?;
+    let mut residency = Residency::default();
+    let plan = |transfer| Ok(prepare(&stage.tree, &Scene { transfer, ..stage.scene.clone() }, &mut residency)?);
+    finer_and_finer(&stage.scene.transfer).into_iter().map(plan).collect()
 }
 
 /// All scenes.

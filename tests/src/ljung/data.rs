@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use brickfield::bricks::{BlockOptions, BlockSource, BlockVolume, build_blocks};
-use brickfield::frame::Mode;
+use brickfield::frame::{Mode, SampleFormat};
 use brickfield::io::WorldFrame;
 use brickfield::lod::{
     BlockBudget, BlockErrors, BlockSelection, BudgetSize, OneSampleBlocks, Slab, select_block_levels,
@@ -64,7 +64,8 @@ impl DataSet {
     /// The same for samples with companions of so many bytes.
     pub(super) fn select_beside(&self, size: BudgetSize, companion_bytes: u8) -> Result<BlockSelection, PaperError> {
         let (scalar, one_sample) = (self.blocks.scalar_type(), OneSampleBlocks::Free);
-        let budget = BlockBudget { size, scalar, companion_bytes, one_sample };
+        let sample_bytes = SampleFormat::of(scalar).n_bytes() as u8 + companion_bytes;
+        let budget = BlockBudget { size, scalar, sample_bytes, one_sample };
         Ok(select_block_levels(self.blocks.layout(), self.errors.levels(), None, &budget)?)
     }
 

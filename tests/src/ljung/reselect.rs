@@ -33,7 +33,7 @@ pub(super) fn run(args: &LjungArgs) -> Result<Vec<Missed>, PaperError> {
     let budget = BlockBudget {
         size: BudgetSize::Ratio(32.0),
         scalar: blocks.scalar_type(),
-        companion_bytes: 0,
+        sample_bytes: 1,
         one_sample: OneSampleBlocks::Free,
     };
     let camera = Viewpoint::default().camera(blocks.grid(), WorldFrame::Lps, args.common.size)?;

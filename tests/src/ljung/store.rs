@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use brickfield::bricks::BlockSource;
 use brickfield::cpu::discrete;
-use brickfield::frame::{Backend, Join, Mode};
+use brickfield::frame::{Backend, Join, Mode, SampleFormat};
 use brickfield::io::OpenOptions;
 use brickfield::lod::{
     BlockBudget, BlockErrors, BlockSelection, BudgetSize, OneSampleBlocks, Slab, select_block_levels,
@@ -92,7 +92,8 @@ fn of_backend(args: &LjungArgs, path: &Path, backend: &mut dyn Backend) -> Resul
     let errors = BlockErrors::estimate(store.layout(), store.summaries(), &transfer, slab)?;
     let size = BudgetSize::Bytes(budget_bytes - limits.cache_bytes);
     let (scalar, one_sample) = (store.scalar_type(), OneSampleBlocks::Free);
-    let budget = BlockBudget { size, scalar, companion_bytes: 0, one_sample };
+    let sample_bytes = SampleFormat::of(scalar).n_bytes() as u8;
+    let budget = BlockBudget { size, scalar, sample_bytes, one_sample };
     let selection = select_block_levels(store.layout(), errors.levels(), None, &budget)?;
     let camera = Viewpoint::default().camera(store.grid(), store.facts().frame, args.common.size)?;
     let scene = Scene { step_voxels: args.common.step, ..Scene::new(camera, args.common.size, transfer.clone()) };

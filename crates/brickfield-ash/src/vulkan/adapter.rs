@@ -7,6 +7,7 @@ use std::ffi::CStr;
 use ash::vk;
 
 use super::Instance;
+use super::device::PipelineIdentity;
 use super::instance::version_text;
 use crate::error::OfCall;
 use crate::{AdapterKind, AdapterSummary, ConnectError};
@@ -18,6 +19,7 @@ pub(crate) struct PhysicalDevice {
     pub(super) memory: vk::PhysicalDeviceMemoryProperties,
     pub(crate) summary: AdapterSummary,
     pub(crate) limits: vk::PhysicalDeviceLimits,
+    pub(super) identity: PipelineIdentity,
     /// Most bytes of one allocation.
     pub(crate) max_allocation: u64,
 }
@@ -67,7 +69,13 @@ fn describe(instance: &Instance, raw: vk::PhysicalDevice) -> Option<PhysicalDevi
         kind: kind(properties.device_type),
     };
     let max_allocation = maintenance.max_memory_allocation_size;
-    Some(PhysicalDevice { raw, memory, summary, limits: properties.limits, max_allocation })
+    let identity = PipelineIdentity {
+        vendor: properties.vendor_id,
+        device: properties.device_id,
+        driver: properties.driver_version,
+        uuid: properties.pipeline_cache_uuid,
+    };
+    Some(PhysicalDevice { raw, memory, summary, limits: properties.limits, identity, max_allocation })
 }
 
 fn driver_text(driver: &vk::PhysicalDeviceDriverProperties<'_>, version: u32) -> String {

@@ -9,7 +9,8 @@
 //! of these is reached only through a mutable borrow of the [`Queue`] or [`Pipeline`] that owns it, so that a backend may move
 //! between threads and is used by one at a time. Memory is mapped once, when it is made; the pointer belongs to its
 //! [`HostBuffer`]. Instance and device are shared (`Arc<Device>`, therefore `Sync`): only calls that ask for no
-//! synchronisation take them by a shared borrow, and the one that destroys each has the last handle. The validation layer calls
+//! synchronisation take them by a shared borrow, and the one that destroys each has the last handle. Pipelines are compiled on any
+//! thread: the device's cache of them is locked by the driver. The validation layer calls
 //! back on the thread that called it; its log is behind a mutex.
 
 mod adapter;
@@ -27,7 +28,7 @@ mod recorder;
 pub(crate) use adapter::{PhysicalDevice, physical_devices};
 pub(crate) use buffer::{Buffer, HostBuffer};
 pub(crate) use canvas::Canvas;
-pub(crate) use device::Device;
+pub(crate) use device::{Device, PipelineIdentity};
 pub(crate) use image::{Sampler, VulkanImage, vulkan_format};
 pub(crate) use instance::Instance;
 pub(crate) use memory::Residence;

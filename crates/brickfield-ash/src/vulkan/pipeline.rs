@@ -191,7 +191,7 @@ impl Pipeline {
         let stage = stage(vk::ShaderStageFlags::COMPUTE, module, &names[0]);
         let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(self.layout);
         // SAFETY: module and layout are alive; the layout was made from the module's own bindings.
-        let made = unsafe { self.device.raw().create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
+        let made = unsafe { self.device.raw().create_compute_pipelines(self.device.pipelines, &[info], None) };
         Ok(made.map_err(|(_, code)| code).of("vkCreateComputePipelines")?[0])
     }
 
@@ -234,7 +234,7 @@ impl Pipeline {
             .render_pass(pass.raw);
         // SAFETY: all objects of the description are alive; stages and layout are of one module. The render pass may go: the ones that
         // the pipeline is used in are compatible.
-        let made = unsafe { self.device.raw().create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
+        let made = unsafe { self.device.raw().create_graphics_pipelines(self.device.pipelines, &[info], None) };
         Ok(made.map_err(|(_, code)| code).of("vkCreateGraphicsPipelines")?[0])
     }
 }

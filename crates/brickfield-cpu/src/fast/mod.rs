@@ -19,8 +19,8 @@ use std::time::Instant;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickSide, Image};
 use brickfield_frame::{
-    Backend, Capabilities, Description, Evaluate, Frame, FramePlan, Join, Places, PlanRay, RenderError, SampleFormat,
-    ShaderFunction, Timing, check_batch, check_memory,
+    Backend, Capabilities, Cost, Description, Evaluate, Frame, FramePlan, Join, Places, PlanRay, RenderError,
+    SampleFormat, ShaderFunction, check_memory, draw_batches,
 };
 use brickfield_interp::Neighbourhood;
 use rayon::prelude::*;
@@ -86,22 +86,17 @@ impl Backend for CpuBackend {
         check(size)?;
         check_memory(size)?;
         let (mut rays, mut brightest) = (Vec::new(), 1.0);
-        let mut wall_ms = 0.0;
-        for plan in batches {
-            check_batch(&plan, size)?;
-            if plan.shows_nothing() {
-                continue;
-            }
+        let cost = draw_batches(size, batches, |plan, _| {
             let begin = Instant::now();
             rays.resize(size.x as usize * size.y as usize, Ray32::default());
-            brightest = dispatch(&plan, Rendering { rays: &mut rays });
-            wall_ms += milliseconds(begin);
-        }
+            brightest = dispatch(plan, Rendering { rays: &mut rays });
+            Ok(Cost::of_rendering(milliseconds(begin)))
+        })?;
         let mut image = Image::transparent(size);
         for (pixel, ray) in image.pixels_mut().iter_mut().zip(&rays) {
             *pixel = ray.rgba(brightest);
         }
-        Ok(Frame::new(image, Timing::of_rendering(wall_ms)))
+        Ok(Frame::new(image, cost.unwrap_or_default()))
     }
 
     fn as_evaluate(&mut self) -> Option<&mut dyn Evaluate> {

@@ -5,7 +5,7 @@ use serde_json::Value;
 use zarrs::storage::{ListableStorageTraits, ReadableStorage, StorePrefix};
 
 use super::json::read_json;
-use super::pack::{STEPS_KEY, is_packed};
+use super::pack::{STEPS_KEY, is_packed, stated_digest};
 use crate::files::stays_within;
 use crate::{ReadError, WorldFrame};
 
@@ -46,6 +46,11 @@ impl Node {
     /// Whether this crate packed the group: then all of its shards are there.
     pub(super) fn is_packed(&self) -> bool {
         is_packed(&self.attributes)
+    }
+
+    /// The digest of its samples that a packed store states.
+    pub(super) fn stated_digest(&self) -> Option<u64> {
+        stated_digest(&self.attributes)
     }
 
     /// The world steps along x, y and z of the finest level, under a key of our own.

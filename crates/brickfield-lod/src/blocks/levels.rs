@@ -45,6 +45,12 @@ impl BlockLevels {
         BlockLevels { layout, levels }
     }
 
+    /// The finer level of each block, of two selections of the same blocks.
+    pub(crate) fn finer_of(self, other: &BlockLevels) -> BlockLevels {
+        let levels = self.levels.iter().zip(&other.levels).map(|(a, b)| *a.min(b)).collect();
+        BlockLevels { levels, ..self }
+    }
+
     /// One level for all blocks; levels beyond one sample count as that.
     pub fn uniform(layout: BlockLayout, level: Level) -> BlockLevels {
         let level = level.min(layout.side().one_sample());

@@ -11,10 +11,10 @@ use super::levels::BlockLevels;
 pub struct BlockBudget {
     /// How many bytes.
     pub size: BudgetSize,
-    /// The type that samples are stored in.
+    /// The type of the volume's voxels: a ratio is one of their bytes.
     pub scalar: ScalarType,
-    /// Bytes that each sample takes besides its value: those of its companions.
-    pub companion_bytes: u8,
+    /// Bytes that a sample takes where it is kept, those of its companions included.
+    pub sample_bytes: u8,
     /// Whether a block of one sample takes bytes.
     pub one_sample: OneSampleBlocks,
 }
@@ -85,7 +85,7 @@ pub fn select_block_levels(
     budget: &BlockBudget,
 ) -> Result<BlockSelection, BudgetError> {
     check_lengths(layout, errors, weights)?;
-    let budget_bytes = budget_bytes(layout, budget)?;
+    let budget_bytes = budget.bytes(layout)?;
     let tariff =
         |ordinal: usize| Tariff::new(layout, ordinal, errors[ordinal], weights.map_or(1.0, |w| w[ordinal]), budget);
     let priced = |ordinal| tariff(ordinal).price();
@@ -140,14 +140,17 @@ fn check_lengths(layout: &BlockLayout, errors: &[LevelErrors], weights: Option<&
     }
 }
 
-fn budget_bytes(layout: &BlockLayout, budget: &BlockBudget) -> Result<u64, BudgetError> {
-    let n_voxels = layout.dims().as_u64vec3().element_product();
-    match budget.size {
-        BudgetSize::Bytes(bytes) => Ok(bytes),
-        BudgetSize::Ratio(ratio) if ratio.is_finite() && ratio > 0.0 => {
-            Ok((n_voxels as f64 * budget.scalar.n_bytes() as f64 / ratio) as u64)
+impl BlockBudget {
+    /// The bytes of the budget for a volume.
+    pub(super) fn bytes(&self, layout: &BlockLayout) -> Result<u64, BudgetError> {
+        let n_voxels = layout.dims().as_u64vec3().element_product();
+        match self.size {
+            BudgetSize::Bytes(bytes) => Ok(bytes),
+            BudgetSize::Ratio(ratio) if ratio.is_finite() && ratio > 0.0 => {
+                Ok((n_voxels as f64 * self.scalar.n_bytes() as f64 / ratio) as u64)
+            }
+            BudgetSize::Ratio(ratio) => Err(BudgetError::Ratio { ratio }),
         }
-        BudgetSize::Ratio(ratio) => Err(BudgetError::Ratio { ratio }),
     }
 }
 
@@ -196,10 +199,7 @@ impl<'a> Tariff<'a> {
     fn at(&self, level: Level) -> (u64, f64) {
         let n = self.layout.n_samples_total(self.layout.block(self.ordinal), level);
         let n = if n == 1 && self.budget.one_sample == OneSampleBlocks::Free { 0 } else { n };
-        (
-            n * (self.budget.scalar.n_bytes() as u64 + u64::from(self.budget.companion_bytes)),
-            self.costs[usize::from(level.0)],
-        )
+        (n * u64::from(self.budget.sample_bytes), self.costs[usize::from(level.0)])
     }
 
     /// The part of a step that gains most for at most so many bytes.

@@ -9,14 +9,14 @@ use brickfield_frame::{Join, Slices};
 use brickfield_io::WorldFrame;
 use brickfield_lod::{
     BlockBudget, BlockErrors, BlockLevels, BlockSelection, BlockView, BudgetSize, Importance, OneSampleBlocks, Slab,
-    block_weights, select_block_levels,
+    block_weights, select_block_levels, spend_rest,
 };
 use clap::Args;
 
 #[cfg(feature = "formats")]
 use super::progress_bar;
 use super::{FinestVoxels, InputOptions, OptionError, ViewOptions, note, values};
-use crate::{BlockStyle, Classification, Scene, TransparentBlocks, companion_bytes};
+use crate::{BlockStyle, Classification, Scene, TransparentBlocks, sample_bytes};
 #[cfg(feature = "formats")]
 use crate::{StoreBlocks, StoreLimits, SummaryProgress};
 
@@ -27,8 +27,9 @@ pub struct BlockArgs {
     /// an octree of bricks (--brick, --downsampling and --lod are not for blocks)
     #[arg(long, value_name = "N", value_parser = values::block_side)]
     pub blocks: Option<BlockSide>,
-    /// Bytes that the samples of all blocks and their spreads and gradients may take, in MiB: on the host, and on the device. Of an OME-Zarr, which is read in parts, a
-    /// quarter of them is for unpacked chunks
+    /// Bytes that the samples of all blocks and their spreads and gradients may take, in MiB: on the host, and on the device. They go where the
+    /// picture gains most; what is left goes to transparent blocks beside visible ones. Of an OME-Zarr, which is read in parts, a quarter is for
+    /// unpacked chunks, and the summaries of blocks come on top
     #[arg(long, value_name = "MIB", requires = "blocks", conflicts_with_all = ["ratio", "block_level"], value_parser = values::positive, allow_hyphen_values = true)]
     pub budget_mib: Option<f64>,
     /// The same as a ratio: 32 for a 32nd of the volume's bytes
@@ -146,7 +147,7 @@ impl BlockArgs {
         let opened = StoreBlocks::open(path, side, limits, &input.open_options(), &mut told);
         bar.finish_and_clear();
         let store = opened?;
-        store.facts().notes.iter().for_each(|text| note(text));
+        store.facts().notes.iter().chain(&store.note()).for_each(|text| note(text));
         let transfer = view.transfer_of_store(&store)?;
         Ok(BlockSubject { frame: store.facts().frame, transfer, max_bytes, blocks: Blocks::Store(Box::new(store)) })
     }
@@ -194,9 +195,13 @@ impl BlockArgs {
         let errors = BlockErrors::estimate(&layout, source.summaries(), &scene.transfer, slab)?;
         let view = BlockView { view: scene.view(), clip: scene.clip, importance: Importance::default() };
         let weights = (!self.any_view).then(|| block_weights(&layout, source.grid(), &view));
-        let companion_bytes = companion_bytes(scene, self.classify);
-        let budget = BlockBudget { size, scalar, companion_bytes, one_sample: OneSampleBlocks::Free };
-        let selection = select_block_levels(&layout, errors.levels(), weights.as_deref(), &budget)?;
+        let sample_bytes = sample_bytes(source, scene, self.classify);
+        let budget = BlockBudget { size, scalar, sample_bytes, one_sample: OneSampleBlocks::Free };
+        let mut selection = select_block_levels(&layout, errors.levels(), weights.as_deref(), &budget)?;
+        if let Join::Blend(_) = self.between {
+            selection =
+                spend_rest(&layout, source.summaries(), &scene.transfer, weights.as_deref(), &budget, selection)?;
+        }
         if selection.n_bytes == 0 && selection.cost > 0.0 {
             note(&"the budget buys no block more than one sample: every block is drawn as its mean");
         }

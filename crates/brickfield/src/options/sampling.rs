@@ -7,7 +7,7 @@ use brickfield_optics::{NarrowPeak, QuadratureRule, changes_across, narrow_peak,
 use clap::Args;
 
 use super::{OptionError, note, values};
-use crate::{Quality, Scene, Skipping, Technique};
+use crate::{Classification, Quality, Scene, Skipping, Technique};
 
 /// How rays are sampled.
 #[derive(Args, Clone, Debug)]
@@ -81,15 +81,20 @@ fn changes_of_blocks(blocks: &dyn BlockSource, value: f64) -> Result<Vec<f64>, F
 }
 
 impl SamplingOptions {
-    /// The scene of a volume, sampled as asked for. The default rule depends on the voxels; without them it is the midpoint rule.
+    /// The scene of a volume, sampled as asked for. The default rule depends on the voxels.
     ///
     /// # Errors
     /// Options that exclude each other; voxels that cannot be fetched.
-    pub fn of(&self, scene: Scene, voxels: Option<FinestVoxels<'_>>) -> Result<Scene, OptionError> {
+    pub fn of(
+        &self,
+        scene: Scene,
+        voxels: FinestVoxels<'_>,
+        classification: Classification,
+    ) -> Result<Scene, OptionError> {
         self.check()?;
         let rule = match self.rule {
             Some(rule) => rule,
-            None => self.default_rule(&scene, voxels)?,
+            None => self.default_rule(&scene, voxels, classification)?,
         };
         let tessellated = Placement::TessellatedShells { facet_pixels: values::FACET_PIXELS };
         // Without polygons, as by default.
@@ -111,20 +116,35 @@ impl SamplingOptions {
         })
     }
 
-    /// The midpoint rule, unless it steps over a peak of the transfer function: then pre-integration, and that is said.
-    fn default_rule(&self, scene: &Scene, voxels: Option<FinestVoxels<'_>>) -> Result<QuadratureRule, OptionError> {
-        let narrow = match (self.lengths, voxels) {
-            (Lengths::True, Some(voxels)) => voxels.narrow_peak(&scene.transfer, self.step)?,
+    /// The midpoint rule, unless it steps over a peak of the transfer function: that is said, and pre-integration is taken where it can be.
+    fn default_rule(
+        &self,
+        scene: &Scene,
+        voxels: FinestVoxels<'_>,
+        classification: Classification,
+    ) -> Result<QuadratureRule, OptionError> {
+        let narrow = match self.lengths {
+            Lengths::True => voxels.narrow_peak(&scene.transfer, self.step)?,
             // Only the midpoint rule has nominal lengths.
-            _ => None,
+            Lengths::Nominal => None,
         };
         let Some(NarrowPeak { values, change }) = narrow else { return Ok(QuadratureRule::MidpointExponential) };
+        let (rule, taken) = match classification {
+            Classification::OfMean => (
+                QuadratureRule::PreIntegrated,
+                "--rule pre-integrated is taken, for the midpoint rule would show rings",
+            ),
+            // Spreads tell of values between the samples of a block, and pre-integration knows nothing of them.
+            Classification::Prefiltered => (
+                QuadratureRule::MidpointExponential,
+                "where blocks are fine, the midpoint rule shows rings: take a shorter --step, or --classify mean",
+            ),
+        };
         note(&format!(
-            "the transfer function has a peak at {:.6} to {:.6}, and from one sample to the next values change by {change:.6}: \
-             --rule pre-integrated is taken, for the midpoint rule would show rings",
+            "the transfer function has a peak at {:.6} to {:.6}, and from one sample to the next values change by {change:.6}: {taken}",
             values.min, values.max
         ));
-        Ok(QuadratureRule::PreIntegrated)
+        Ok(rule)
     }
 
     /// Refuses what is wrong for any volume: `prepare` does, too, but here the options are known by name.

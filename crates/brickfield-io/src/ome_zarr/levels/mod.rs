@@ -19,7 +19,7 @@ use super::axes::VolumeAxes;
 use super::find::{Depth, ImageArray, find_levels};
 use super::metadata::ArrayMetadata;
 use super::node::{Node, joined};
-use super::pack::{FOLDER, N_COLUMNS, summary_of};
+use super::pack::{FOLDER, N_COLUMNS, digest, summary_of};
 use crate::guard::guarded;
 use crate::limits::{CheckedShape, check_bytes};
 use crate::opened::FileFacts;
@@ -41,6 +41,8 @@ pub struct ZarrLevels {
     /// Path of the group of the image.
     group: String,
     is_packed: bool,
+    /// Packed, and not changed since.
+    has_own_samples: bool,
     store: ReadableStorage,
     limits: Limits,
     cache: Cache,
@@ -95,11 +97,19 @@ impl ZarrLevels {
             check_bytes(level.parts.n_bytes(), &options.limits, what)?;
         }
         let group = image.path.rsplit_once('/').map_or("", |(group, _)| group).to_owned();
+        let mut facts = found.described(grid, shape.scalar, Rescale::IDENTITY)?;
+        // The digest is of all levels.
+        let is_finest = facts.choices.iter().all(|choice| choice.read == 0);
+        let has_own_samples = image.is_packed && is_finest && is_as_packed(&store, &group, &levels)?;
+        if image.is_packed && is_finest && !has_own_samples {
+            facts.notes.push(Note::ChangedStore);
+        }
         Ok(ZarrLevels {
-            facts: found.described(grid, shape.scalar, Rescale::IDENTITY)?,
+            facts,
             levels,
             group,
             is_packed: image.is_packed,
+            has_own_samples,
             store,
             limits: options.limits,
             cache: Cache::new(cache_bytes),
@@ -263,14 +273,14 @@ impl ZarrLevels {
         self.n_bytes_read.fetch_add(n, Ordering::Relaxed);
     }
 
-    /// The summaries of all blocks of a side, if [`PyramidWriter`](super::PyramidWriter) stored them and the finest level was asked for.
+    /// The summaries of all blocks of a side, if [`PyramidWriter`](super::PyramidWriter) stored them, the finest level was asked for, and nobody
+    /// has changed the samples since ([`Note::ChangedStore`]).
     ///
     /// # Errors
     /// Arrays that do not fit the volume or are damaged; more bytes than the limits.
     pub fn block_summaries(&self, side: BlockSide) -> Result<Option<Vec<BlockSummary>>, ReadError> {
         let path = joined(&self.group, &format!("{FOLDER}/{side}"));
-        let is_finest = self.facts.choices.iter().all(|choice| choice.read == 0);
-        if !self.is_packed || !is_finest || Node::read(&self.store, &path)?.is_none() {
+        if !self.has_own_samples || Node::read(&self.store, &path)?.is_none() {
             return Ok(None);
         }
         let n = BlockLayout::new(self.facts.grid.dims(), side).n_blocks();
@@ -302,6 +312,14 @@ impl ZarrLevels {
         }
         Ok(summaries)
     }
+}
+
+/// Whether the samples of a packed store are those that were packed.
+fn is_as_packed(store: &ReadableStorage, group: &str, levels: &[LevelArray]) -> Result<bool, ReadError> {
+    let stated = Node::read(store, group)?.and_then(|node| node.stated_digest());
+    let shards: Vec<_> = levels.iter().map(|level| level.parts.chunk_keys()).collect();
+    let found = digest(&**store, &shards).map_err(|e| ReadError::decoder("the digest of the store", e))?;
+    Ok(stated == Some(found.into()))
 }
 
 impl LevelArray {

@@ -6,10 +6,11 @@ use brickfield_core::{Scalar, ScalarType};
 use zarrs::array::codec::api::ArrayToBytesCodecTraits;
 use zarrs::array::{Array, ArrayBytesRaw, CodecOptions};
 use zarrs::storage::byte_range::ByteRange;
-use zarrs::storage::{ReadableStorage, ReadableStorageTraits};
+use zarrs::storage::{ReadableStorage, ReadableStorageTraits, StoreKey};
 
 use super::super::bounds::{Packing, Shard, check_stream};
 use super::super::metadata::ArrayMetadata;
+use super::super::pack::keys;
 use crate::error::{bytes, check_length};
 use crate::numbers::{FileScalar, with_room};
 use crate::stored_type::StoredType;
@@ -110,6 +111,11 @@ impl Parts {
     /// The type that samples are read into.
     pub(super) fn scalar(&self) -> ScalarType {
         self.stored.read_into()
+    }
+
+    /// The keys of the files of all chunks.
+    pub(super) fn chunk_keys(&self) -> Vec<StoreKey> {
+        keys(self.chunks.chunk_grid_shape(), |chunk| self.chunks.chunk_key(chunk))
     }
 
     /// The chunk that a part lies in.

@@ -4,10 +4,11 @@ use brickfield_core::glam::UVec3;
 use brickfield_core::{Level, Scalar, ScalarType, Voxels, with_voxels};
 use serde_json::{Value, json};
 use zarrs::array::{Array, CodecOptions, Element};
-use zarrs::storage::{WritableStorage, WritableStorageTraits};
+use zarrs::storage::{StoreKey, WritableStorage, WritableStorageTraits};
 
 use super::super::write::data_type;
 use super::Fault;
+use super::digest::keys;
 use super::layer::append;
 use crate::Compression;
 use crate::samples::room_for;
@@ -127,6 +128,10 @@ impl LevelWriter {
     /// The metadata, and their key. Those that `zarrs` writes have codecs by bare names, which not every reader takes.
     pub(super) fn metadata(&self) -> (String, &Value) {
         (self.key.clone(), &self.metadata)
+    }
+
+    pub(super) fn shard_keys(&self) -> Vec<StoreKey> {
+        keys(self.array.chunk_grid_shape(), |chunk| self.array.chunk_key(chunk))
     }
 }
 

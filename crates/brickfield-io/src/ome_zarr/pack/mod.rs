@@ -1,9 +1,11 @@
 //! Writing all levels of a volume as OME-Zarr 0.5, slice by slice.
 
+mod digest;
 mod layer;
 mod level;
 mod summaries;
 
+pub(super) use digest::{digest, keys};
 pub(super) use summaries::{FOLDER, N_COLUMNS, summary_of};
 
 use std::fs;
@@ -15,7 +17,7 @@ use brickfield_core::glam::UVec3;
 use brickfield_core::{BlockSide, BlockSummary, Grid, Level, ScalarType, Voxels};
 use serde_json::{Value, json};
 use zarrs::filesystem::FilesystemStore;
-use zarrs::storage::{StoreKey, WritableStorage};
+use zarrs::storage::{ReadableWritableStorage, StoreKey, WritableStorage};
 
 use super::write::group;
 use crate::placement::is_turned;
@@ -28,7 +30,7 @@ use summaries::SummaryWriter;
 pub(super) const PACKED_KEY: &str = "brickfield_pack";
 /// The attribute with the world steps along x, y and z of a volume whose axes are not the world's.
 pub(super) const STEPS_KEY: &str = "brickfield_steps";
-const PACKED_VERSION: u64 = 1;
+const PACKED_VERSION: u64 = 2;
 
 pub(super) type Fault = Box<dyn std::error::Error + Send + Sync>;
 
@@ -41,14 +43,14 @@ pub(super) type Fault = Box<dyn std::error::Error + Send + Sync>;
 /// Summaries of blocks (Ljung, Lundstroem and Ynnerman 2006) are arrays of their own, `brickfield_blocks/8`, `/16` and `/32`, of 64-bit
 /// floats: axes z, y, x of the blocks, and columns. These are least, greatest, mean and variance of the voxels, the parts of the
 /// variance that the averages of levels 0 to 5 keep, and the voxels in 16 bins of equal width, as parts of 65,535. Other programs need
-/// not know of them.
+/// not know of them. The store states a digest of its samples: where they were changed since, the summaries are not taken.
 ///
 /// Memory: 32 slices of each level, together 4/3 of 32 slices of level 0; and two copies of a shard.
 pub struct PyramidWriter {
     path: PathBuf,
     /// Where the store is made; removed with all in it if it is not finished.
     unfinished: Option<tempfile::TempDir>,
-    store: WritableStorage,
+    store: ReadableWritableStorage,
     group: Value,
     levels: Vec<LevelWriter>,
     summaries: Vec<SummaryWriter>,
@@ -88,14 +90,13 @@ impl PyramidWriter {
 
     fn of_store(
         path: &Path,
-        store: WritableStorage,
+        store: ReadableWritableStorage,
         grid: &Grid,
         scalar: ScalarType,
         coarsest: Level,
         options: &SaveOptions,
     ) -> Result<PyramidWriter, SaveError> {
         let mut group = group(grid, options, coarsest);
-        group["attributes"][PACKED_KEY] = json!({ "version": PACKED_VERSION });
         if (0..3).any(|axis| is_turned(grid, axis)) {
             group["attributes"][STEPS_KEY] = json!(grid.index_to_world().matrix3.to_cols_array_2d());
         }
@@ -107,6 +108,7 @@ impl PyramidWriter {
             levels: Vec::new(),
             summaries: Vec::new(),
         };
+        let store: WritableStorage = store;
         let levels = (0..=coarsest.0)
             .map(|l| LevelWriter::new(&store, grid.dims(), Level(l), scalar, options.compression))
             .collect::<Result<_, Fault>>();
@@ -191,7 +193,10 @@ impl PyramidWriter {
     }
 
     /// The metadata of the image come last.
-    fn write_metadata(&self) -> Result<(), Fault> {
+    fn write_metadata(&mut self) -> Result<(), Fault> {
+        let shards: Vec<_> = self.levels.iter().map(LevelWriter::shard_keys).collect();
+        let digest = digest(&*self.store, &shards)?;
+        self.group["attributes"][PACKED_KEY] = json!({ "version": PACKED_VERSION, "digest": digest });
         let write = |key: &str, json: &Value| -> Result<(), Fault> {
             Ok(self.store.set(&StoreKey::new(key)?, serde_json::to_vec_pretty(json)?.into())?)
         };
@@ -215,6 +220,11 @@ impl PyramidWriter {
 /// Whether the attributes of a group say that this crate packed it.
 pub(super) fn is_packed(attributes: &Value) -> bool {
     attributes[PACKED_KEY]["version"] == PACKED_VERSION
+}
+
+/// The digest that a packed store states.
+pub(super) fn stated_digest(attributes: &Value) -> Option<u64> {
+    attributes[PACKED_KEY]["digest"].as_u64()
 }
 
 #[cfg(test)]

@@ -38,7 +38,8 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         return render_trimmed(args, trimming, backend.as_mut());
     }
     let subject = Subject::open(&args.file, &args.input, &args.tree, &args.view)?;
-    let scene = args.sampling.of(args.view.scene(&subject)?, Some(FinestVoxels::Volume(&subject.volume)))?;
+    let scene =
+        args.sampling.of(args.view.scene(&subject)?, FinestVoxels::Volume(&subject.volume), Classification::OfMean)?;
     let scene = args.light.of(scene, subject.volume.range(), subject.tree.grid())?;
     let mut residency = Residency::default();
     let plan = prepare(&subject.tree, &scene, &mut residency).map_err(Failure::usage)?;
@@ -102,9 +103,7 @@ fn render_blocks(args: &RenderArgs, side: BlockSide, backend: &mut dyn Backend) 
     check_of_store(args, &subject.blocks)?;
     let source = subject.blocks.source();
     let scene = args.view.scene_of(source.grid(), subject.frame, &subject.transfer)?;
-    // Prefiltered samples know of peaks between them; pre-integration would know nothing of spreads.
-    let voxels = (args.flat.classify == Classification::OfMean).then(|| subject.blocks.finest_voxels());
-    let scene = args.sampling.of(scene, voxels)?;
+    let scene = args.sampling.of(scene, subject.blocks.finest_voxels(), args.flat.classify)?;
     let scene = args.light.of(scene, source.range(), source.grid())?;
     let selection = args.flat.select(&subject, &scene)?;
     let (levels, mut residency) = (&selection.levels, BlockResidency::default());
@@ -124,7 +123,11 @@ fn render_trimmed(args: &RenderArgs, trimming: Trimming, backend: &mut dyn Backe
     let (volume, frame, transfer) = args.input.open_to_render(&args.file, &args.view)?;
     let source = TrimmedVolume::new(Arc::new(volume), args.tree.brick);
     let (volume, grid) = (source.volume(), source.volume().grid());
-    let scene = args.sampling.of(args.view.scene_of(grid, frame, &transfer)?, Some(FinestVoxels::Volume(volume)))?;
+    let scene = args.sampling.of(
+        args.view.scene_of(grid, frame, &transfer)?,
+        FinestVoxels::Volume(volume),
+        Classification::OfMean,
+    )?;
     let scene = args.light.of(scene, volume.range(), grid)?;
     if let Some(mib) = args.cache_mib {
         return render_in_batches(args, trimming, backend, (&source, &scene), mib);
@@ -208,12 +211,12 @@ fn block_summary(subject: &BlockSubject, levels: &BlockLevels, residency: &Block
         .map(|(level, n)| format!("{n} of level {}", level.0))
         .collect();
     let slots = plan.field().slots();
-    let of = |name: &str, slots: &Arc<Slots>| format!(", {name} {:.1} MiB", mib(slots.n_bytes() as u64));
+    let of = |name: &str, slots: &Arc<Slots>| format!(", {name} {:.2} MiB", mib(slots.n_bytes() as u64));
     let spreads = plan.spreads().map(|spreads| of("spreads", spreads)).unwrap_or_default();
     let gradients = plan.gradients().map(|gradients| of("gradients", gradients)).unwrap_or_default();
     let free = residency.n_free_texels() * slots.format().n_bytes() as u64;
     format!(
-        "flat blocks of {}: {}; {:.1}:1\nkept {:.1} MiB{spreads}{gradients}, {:.1} MiB of the texture free; with ghost layers {:.1} MiB (one side), {:.1} MiB (both)\n",
+        "flat blocks of {}: {}; {:.1}:1\nkept {:.2} MiB{spreads}{gradients}, {:.2} MiB of the texture free; with ghost layers {:.2} MiB (one side), {:.2} MiB (both)\n",
         layout.side(),
         by_level.join(", "),
         memory.ratio(),
