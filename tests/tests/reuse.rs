@@ -2,13 +2,18 @@
 
 use std::sync::Arc;
 
+use brickfield::bricks::{BlockOptions, build_blocks};
 use brickfield::core::glam::{DVec3, UVec2, UVec3};
-use brickfield::core::{BrickSide, Camera, Grid, Knot, Projection, TransferFunction};
+use brickfield::core::{
+    BlockSide, BrickSide, Camera, Grid, Interblock, Knot, Level, Projection, TransferFunction, Volume,
+};
 use brickfield::frame::{
     Backend, Chunk, DarkRegions, Decode, Drawing, Evaluate, Feature, Field, Frame, FramePlan, IndexEntry, IndexGrid,
     IndexLattice, Join, MacrocellRanges, Mode, Occupancy, Places, PlanParts, QuadratureRule, RayFrame, Reach,
     SampleFormat, Sampling, Sequence, ShaderFunction, Slots, Steps,
 };
+use brickfield::optics::{Light, LightSource, LightTerms, Normals};
+use brickfield::{BlockResidency, BlockStyle, Classification, Scene, prepare_blocks};
 use brickfield_ash::{AshBackend, ConnectError, Options, Validation};
 use brickfield_wgpu::{AdapterChoice, OpenError, WgpuBackend};
 
@@ -61,6 +66,7 @@ on_both_backends! {
     leaps_are_over_the_dark_of_the_bricks_that_are_there
     bricks_that_were_not_drawn_for_a_while_are_still_themselves
     an_unchanged_plan_brings_its_numbers_only
+    flat_blocks_that_come_move_and_go_are_drawn_where_they_are
 }
 
 const SIDE: BrickSide = BrickSide::S16;
@@ -253,4 +259,46 @@ fn the_layer_is_silent_while_an_atlas_grows_brick_by_brick() {
     let Some(mut backend) = connect(&options) else { return };
     grow(&mut backend, leaping);
     assert_eq!(backend.validation_messages(), Vec::<String>::new());
+}
+
+/// Frames of one residency on one device look as each does alone: coarse and fine levels by turns, so that blocks are packed anew, with
+/// spreads and gradients and without.
+fn flat_blocks_that_come_move_and_go_are_drawn_where_they_are<B: Open>() {
+    let Some(mut backend) = B::open() else { return };
+    let grid = Grid::axis_aligned(UVec3::new(40, 33, 20), DVec3::ONE).unwrap();
+    let voxels: Vec<u8> = (0..grid.n_voxels() as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+    let volume = Arc::new(Volume::new(grid, voxels).unwrap());
+    let blocks = build_blocks(volume, &BlockOptions { side: BlockSide::V8, ..BlockOptions::default() }).unwrap();
+    let knot = |value, extinction| Knot { value, extinction, color: [0.9, 0.4, 0.2] };
+    let transfer = TransferFunction::new(vec![knot(60.0, 0.0), knot(255.0, 0.1)]).unwrap();
+    let camera = Camera::framing(&grid.world_box(), DVec3::new(1.0, 0.8, 0.5), DVec3::Z).unwrap();
+    let light = Light::new(LightSource::Head, LightTerms::default(), 20.0).unwrap();
+    let n_blocks = brickfield::bricks::BlockSource::layout(&blocks).n_blocks_total();
+    let levels = |n_fine: usize, level: u8| {
+        (0..n_blocks).map(|i| Level(if i % 7 < n_fine { level } else { 3 })).collect::<Vec<_>>()
+    };
+    let mut residency = BlockResidency::default();
+    for (n_fine, level, is_rich) in [
+        (7, 0, true),
+        (1, 1, true),
+        (6, 0, true),
+        (1, 2, false),
+        (5, 1, true),
+        (2, 0, false),
+        (0, 3, true),
+        (7, 1, true),
+    ] {
+        let normals = if is_rich { Normals::Stored } else { Normals::Central };
+        let light = Some(light.on_normals(normals));
+        let scene = Scene { light, ..Scene::new(camera, UVec2::new(32, 24), transfer.clone()) };
+        let classification = if is_rich { Classification::Prefiltered } else { Classification::OfMean };
+        let style =
+            BlockStyle { join: Join::Blend(Interblock::MaximumDistance), classification, ..BlockStyle::default() };
+        let levels = levels(n_fine, level);
+        let plan = prepare_blocks(&blocks, &scene, &levels, style, &mut residency).unwrap();
+        let alone = prepare_blocks(&blocks, &scene, &levels, style, &mut BlockResidency::default()).unwrap();
+        let image = backend.render(&plan).unwrap().image;
+        assert!(image.pixels().iter().any(|pixel| pixel[3] > 0.1));
+        assert!(image == B::open().unwrap().render(&alone).unwrap().image, "{n_fine} of 7 blocks at level {level}");
+    }
 }

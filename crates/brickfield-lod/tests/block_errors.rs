@@ -265,3 +265,19 @@ fn an_edit_concerns_the_blocks_that_have_its_values() {
         "{concerned} {expected}"
     );
 }
+
+#[test]
+fn a_block_is_as_deep_as_a_cube_of_its_volume() {
+    let grid = Grid::axis_aligned(layout().dims(), DVec3::new(1.0, 2.0, 4.0)).unwrap();
+    assert_eq!(Slab::of_block(&layout(), &grid), Slab::new(16.0, [0.0; 3]).unwrap());
+}
+
+#[test]
+fn an_edit_of_colours_alone_is_followed() {
+    let ramp = |first: [f64; 3]| transfer(&[(0.1, 0.3, first), (0.9, 0.3, [1.0, 1.0, 0.9])]);
+    let summaries = summaries(scan, &layout());
+    let mut errors = BlockErrors::estimate(&layout(), &summaries, &ramp([0.9, 0.1, 0.1]), slab()).unwrap();
+    let edited = ramp([0.1, 0.1, 0.9]);
+    assert!(errors.update(&summaries, &edited).unwrap() > 0);
+    assert_eq!(errors.levels(), BlockErrors::estimate(&layout(), &summaries, &edited, slab()).unwrap().levels());
+}

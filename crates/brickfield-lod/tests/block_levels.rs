@@ -349,15 +349,58 @@ fn what_is_left_refines_transparent_blocks_beside_visible_ones() {
     };
     // Beside visible blocks 0, 4, 8 and 12, and not of one value as block 1. The last one is beside none.
     let beside: Vec<bool> = (0..16).map(|i| i % 4 != 0 && i % 4 != 2 && i != 1 && i != 15).collect();
-    for one_sample in [OneSampleBlocks::Free, OneSampleBlocks::Stored] {
+    for (one_sample, too_few) in [(OneSampleBlocks::Free, 7), (OneSampleBlocks::Stored, 22)] {
         let (rest, is_refined) = rest_of(1 << 20, one_sample, None);
         assert_eq!(is_refined, beside);
         assert!(rest.levels.levels().iter().zip(&beside).all(|(level, beside)| (*level == Level(0)) == *beside));
-        assert_eq!(rest_of(16, one_sample, None).0.levels, BlockLevels::uniform(layout, Level(3)));
+        assert_eq!(rest_of(too_few, one_sample, None).0.levels, BlockLevels::uniform(layout, Level(3)));
     }
-    // For one block of 512 samples: that of the greatest variance; and none without weight.
-    assert_eq!(rest_of(512, OneSampleBlocks::Free, None).1.iter().rposition(|refined| *refined), Some(13));
+    // Bytes for one block of two samples a side: that of the greatest variance. None for blocks without weight.
+    assert_eq!(rest_of(8, OneSampleBlocks::Free, None).1, (0..16).map(|i| i == 13).collect::<Vec<_>>());
     let weights: Vec<f32> = (0..16u8).map(|i| f32::from(u8::from(i < 6))).collect();
     let (_, is_refined) = rest_of(1 << 20, OneSampleBlocks::Free, Some(&weights));
     assert_eq!(is_refined, (0..16).map(|i| beside[i] && i < 6).collect::<Vec<_>>());
+}
+
+#[test]
+fn every_one_of_many_blocks_is_priced() {
+    // More than are priced at once.
+    let layout = BlockLayout::new(UVec3::new(8 * 1030, 8, 8), BlockSide::V8);
+    let errors = vec![FALLING; layout.n_blocks_total()];
+    let selection = select_block_levels(&layout, &errors, None, &budget(BudgetSize::Bytes(u64::MAX))).unwrap();
+    assert_eq!((selection.n_bytes, selection.cost), (1030 * 512, 0.0));
+    assert_eq!(selection.levels, BlockLevels::uniform(layout, Level(0)));
+}
+
+#[test]
+fn what_is_left_buys_the_part_of_a_step_that_gains_most() {
+    let layout = BlockLayout::new(UVec3::splat(8), BlockSide::V8);
+    // Level 0 gains most per byte: the one step is from one sample to all.
+    let errors: LevelErrors = [0.0, 9.0, 9.9, 10.0, 0.0, 0.0];
+    for (bytes, level) in [(512, 0), (511, 1), (64, 1), (63, 2), (8, 2), (7, 3)] {
+        let selection = select_block_levels(&layout, &[errors], None, &budget(BudgetSize::Bytes(bytes))).unwrap();
+        assert_eq!(selection.levels.levels(), [Level(level)], "{bytes}");
+    }
+    // What the first block's part takes is gone for the second's.
+    let two = BlockLayout::new(UVec3::new(16, 8, 8), BlockSide::V8);
+    for (bytes, levels) in [(65, [1, 3]), (71, [1, 3]), (72, [1, 2])] {
+        let selection = select_block_levels(&two, &[errors; 2], None, &budget(BudgetSize::Bytes(bytes))).unwrap();
+        assert_eq!(selection.levels.levels(), levels.map(Level), "{bytes}");
+        assert!(selection.n_bytes <= bytes);
+    }
+}
+
+#[test]
+fn a_short_block_weighs_as_its_own_voxels_do() {
+    use brickfield_core::{Camera, Grid};
+    use brickfield_lod::View;
+    // The last block has four voxels along x; the middle of its own voxels is 2 past its corner.
+    let layout = BlockLayout::new(UVec3::new(36, 16, 16), BlockSide::V16);
+    let grid = Grid::axis_aligned(layout.dims(), DVec3::ONE).unwrap();
+    let camera = Camera::framing(&grid.world_box(), -DVec3::X, DVec3::Z).unwrap();
+    let view = View { camera, size: [64, 64].into(), culling: Culling::Off };
+    let weights = block_weights(&layout, &grid, &BlockView { view, clip: None, importance: Importance::default() });
+    let distance = |x: f64| 0.5 * grid.world_box().diagonal() / 20f64.to_radians().sin() - 18.0 + x;
+    let expected = (distance(34.0) / distance(8.0)).powi(2);
+    assert!((f64::from(weights[0] / weights[2]) / expected - 1.0).abs() < 1e-5);
 }

@@ -67,6 +67,8 @@ const MOST_TEXELS: UVec3 = UVec3::new(MAX_TEXELS, MAX_TEXELS, 1024);
 /// Blocks are packed anew if their texture has this many times the cubes that they need, and a few more.
 const TOO_LARGE: u64 = 2;
 const FEW_CUBES: u64 = 8;
+/// They are, too, if it has grown to this many times the layers that it is wide and high.
+const TOO_TALL: u32 = 4;
 
 impl BlockResidency {
     /// The blocks whose samples the last frame fetched.
@@ -113,7 +115,7 @@ impl BlockResidency {
         held.companions.retain(|companion, _| companions.contains(companion));
         beside.into_iter().for_each(|fetched| held.put_companions(fetched));
         held.has_changed |= !new.is_empty();
-        if !new.is_empty() && held.is_too_large(source.layout()) {
+        if !new.is_empty() && held.is_badly_packed(source.layout()) {
             held.pack_anew(source.layout());
         }
         self.held = Some(held);
@@ -247,10 +249,13 @@ impl Held {
         n_cubes(layout.side(), in_texture.map(|i| cube_level(layout, i, self.rows[i].level)))
     }
 
-    fn is_too_large(&self, layout: &BlockLayout) -> bool {
-        let side = u64::from(layout.side().n_voxels());
-        let n_held = self.texels().as_u64vec3().element_product() / side.pow(3);
-        self.dense_level().is_none() && n_held > TOO_LARGE * self.n_cubes(layout) + FEW_CUBES
+    /// Whether the texture is much too large; or too tall, for it grows by layers, and those are as wide as the first frame asked for.
+    fn is_badly_packed(&self, layout: &BlockLayout) -> bool {
+        let (texels, side) = (self.texels(), u64::from(layout.side().n_voxels()));
+        let n_held = texels.as_u64vec3().element_product() / side.pow(3);
+        let is_too_large = n_held > TOO_LARGE * self.n_cubes(layout) + FEW_CUBES;
+        let is_too_tall = n_held > FEW_CUBES && texels.z > TOO_TALL * texels.x.max(texels.y);
+        self.dense_level().is_none() && (is_too_large || is_too_tall)
     }
 
     /// Moves all blocks together. Each is another content, for its place is another.
@@ -450,6 +455,108 @@ mod tests {
         let levels = vec![Level(0); source.layout().n_blocks_total()];
         let field = field(&mut BlockResidency::default(), &source, &levels, &[]);
         assert_eq!(field.dense_level(), None);
+    }
+
+    /// The content, first texel and size of every block that has texels.
+    fn contents(slots: &Slots, of: &Slots) -> Vec<Option<(brickfield_frame::ContentId, UVec3, UVec3)>> {
+        let Places::Blocks(places) = of.places() else { panic!("flat blocks") };
+        let content = |(i, block)| {
+            let place = places.place(block);
+            slots.samples(i as u32).map(|chunk| (chunk.id(), place.texel, place.n))
+        };
+        places.layout().blocks().enumerate().map(content).collect()
+    }
+
+    /// No two blocks have a texel in common; a content that was there before lies where it was, for nobody brings it anew.
+    fn check_places(field: &Field, last: Option<&Field>) {
+        let now = contents(field.slots(), field.slots());
+        for (i, (_, p, n)) in now.iter().enumerate().filter_map(|(i, own)| Some((i, (*own)?))) {
+            let apart = |(_, q, m): &(_, UVec3, UVec3)| (p + n).cmple(*q).any() || (*q + *m).cmple(p).any();
+            assert!(now[i + 1..].iter().flatten().all(apart), "block {i} at {p} lies on another");
+        }
+        let Some(last) = last else { return };
+        let mut all = vec![(Some(field.slots()), Some(last.slots()))];
+        all.extend(Companion::ALL.map(|companion| (field.companions(companion), last.companions(companion))));
+        for (now, before) in all.into_iter().filter_map(|(now, before)| Some((now?, before?))) {
+            let (now, before) = (contents(now, field.slots()), contents(before, last.slots()));
+            for (id, texel, _) in now.iter().flatten() {
+                let same = before.iter().flatten().find(|other| other.0 == *id);
+                assert!(same.is_none_or(|other| other.1 == *texel), "a content has moved to {texel}");
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn blocks_lie_apart_and_contents_stay_where_they_are(
+            // Mostly one sample: then blocks are packed anew.
+            frames in prop::collection::vec((prop::collection::vec(0..4u8, 3 * 3 * 2), any::<bool>()), 2..8)
+        ) {
+            let (source, mut residency) = (blocks(), BlockResidency::default());
+            let mut last: Option<Field> = None;
+            for (levels, is_coarse) in frames {
+                let level = |(i, level): (usize, u8)| if is_coarse && i % 5 > 0 { Level(3) } else { Level(level / 2) };
+                let levels: Vec<Level> = levels.into_iter().enumerate().map(level).collect();
+                let next = field(&mut residency, &source, &levels, &[Companion::Spread]);
+                check_places(&next, last.as_ref());
+                last = Some(next);
+            }
+        }
+    }
+
+    #[test]
+    fn blocks_that_are_packed_anew_are_other_contents() {
+        let (source, mut residency) = (blocks(), BlockResidency::default());
+        let n_blocks = source.layout().n_blocks_total();
+        let levels =
+            |level, of_eighth| (0..n_blocks).map(|i| Level(if i == 7 { of_eighth } else { level })).collect::<Vec<_>>();
+        let fine = field(&mut residency, &source, &levels(0, 1), &Companion::ALL);
+        let coarse = field(&mut residency, &source, &levels(3, 1), &Companion::ALL);
+        let Places::Blocks(places) = coarse.slots().places() else { panic!("flat blocks") };
+        assert_eq!(places.texels(), UVec3::splat(8), "not packed anew");
+        check_places(&coarse, Some(&fine));
+    }
+
+    #[test]
+    fn another_source_of_the_same_layout_has_its_own_samples() {
+        let (one, mut residency) = (blocks(), BlockResidency::default());
+        let voxels = vec![7u16; one.volume().voxels().len()];
+        let volume = Arc::new(Volume::new(*one.volume().grid(), voxels).unwrap());
+        let other = build_blocks(volume, &BlockOptions { side: BlockSide::V8, ..BlockOptions::default() }).unwrap();
+        let levels: Vec<Level> = (0..18).map(|i| Level(i % 4)).collect();
+        field(&mut residency, &one, &levels, &[]);
+        let of_other = field(&mut residency, &other, &levels, &[]);
+        assert_eq!(of_other, field(&mut BlockResidency::default(), &other, &levels, &[]));
+        assert_eq!(residency.copied().n_bricks, 18);
+    }
+
+    #[test]
+    fn a_texture_that_began_small_has_room_for_many_blocks_later() {
+        let grid = Grid::axis_aligned(UVec3::new(64, 64, 32), DVec3::ONE).unwrap();
+        let volume = Arc::new(Volume::new(grid, (0..grid.n_voxels()).map(|i| i as u8).collect::<Vec<_>>()).unwrap());
+        let source = build_blocks(volume, &BlockOptions { side: BlockSide::V8, ..BlockOptions::default() }).unwrap();
+        let levels = |others| (0..256).map(|i| Level(if i == 0 { 1 } else { others })).collect::<Vec<_>>();
+        let mut residency = BlockResidency::default();
+        for others in [3, 0] {
+            let field = field(&mut residency, &source, &levels(others), &[]);
+            let Places::Blocks(places) = field.slots().places() else { panic!("flat blocks") };
+            assert!(places.texels().cmple(MOST_TEXELS).all(), "{}", places.texels());
+        }
+    }
+
+    #[test]
+    fn the_index_follows_what_is_drawn() {
+        let (source, mut residency) = (blocks(), BlockResidency::default());
+        let levels = vec![Level(1); 18];
+        for n_drawn in [18, 5, 5, 11] {
+            residency.hold(&source, &levels, &[]).unwrap();
+            let drawn: Vec<bool> = (0..18).map(|i| i < n_drawn).collect();
+            let field = residency.field(&source, drawn.clone(), Join::Shared);
+            let is_there = |block| matches!(field.index().at(block), IndexEntry::Resident { .. });
+            assert_eq!(source.layout().blocks().map(is_there).collect::<Vec<_>>(), drawn);
+        }
     }
 
     /// Values alone, as of a store.

@@ -337,6 +337,29 @@ mod tests {
     }
 
     #[test]
+    fn blocks_in_which_long_pre_integrated_segments_end_are_drawn() {
+        let dims = UVec3::new(48, 16, 16);
+        let grid = Grid::axis_aligned(dims, DVec3::ONE).unwrap();
+        // One layer of blocks shows something.
+        let voxels: Vec<u16> = (0..grid.n_voxels() as u32).map(|i| if i % 48 / 8 == 2 { 40_000 } else { 0 }).collect();
+        let volume = Arc::new(Volume::new(grid, voxels).unwrap());
+        let source = build_blocks(volume, &BlockOptions { side: BlockSide::V8, ..BlockOptions::default() }).unwrap();
+        let levels = vec![Level(0); source.layout().n_blocks_total()];
+        let knot = |value: f64, extinction: f64| Knot { value, extinction, color: [1.0; 3] };
+        let transfer = TransferFunction::new(vec![knot(10_000.0, 0.0), knot(40_000.0, 0.1)]).unwrap();
+        let camera = Camera::framing(&grid.world_box(), DVec3::new(1.0, 0.1, 0.2), DVec3::Z).unwrap();
+        let mut backend = open_backend(BackendKind::Cpu, None, Validation::Off).unwrap();
+        let mut picture = |skipping| {
+            let scene = Scene::new(camera, UVec2::new(16, 16), transfer.clone());
+            let scene = Scene { rule: QuadratureRule::PreIntegrated, step_voxels: 12.0, skipping, ..scene };
+            let style = BlockStyle { join: Join::Shared, ..BLENDED };
+            let plan = prepare_blocks(&source, &scene, &levels, style, &mut BlockResidency::default()).unwrap();
+            backend.render(&plan).unwrap().image
+        };
+        assert_eq!(picture(Skipping::On), picture(Skipping::Off));
+    }
+
+    #[test]
     fn levels_that_are_none_are_named() {
         let source = blocks(UVec3::new(20, 8, 8));
         let error = |levels: &[Level]| {

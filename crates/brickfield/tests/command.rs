@@ -451,3 +451,36 @@ fn a_reader_that_goes_away_is_no_failure() {
     child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
     assert!(child.wait().unwrap().success() && said.is_empty(), "{said}");
 }
+
+#[test]
+#[cfg(feature = "formats")]
+fn a_budget_is_spent_on_what_is_seen_and_holds_all_that_it_is_for() {
+    let place = WorkFolder::new();
+    let (dims, value) = (UVec3::new(100, 90, 80), |i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8);
+    let grid = Grid::axis_aligned(dims, DVec3::ONE).unwrap();
+    let volume = Volume::new(grid, (0..dims.element_product()).map(value).collect::<Vec<_>>()).unwrap();
+    save(&place.path().join("b.nrrd"), &volume, &SaveOptions::default()).unwrap();
+    assert_eq!(place.run("pack|b.nrrd|-o|b.zarr").status.code(), Some(0));
+    // The samples of the blocks, by their printed ratio to the volume's.
+    let said = |file: &str, words: &str| {
+        let out = place.run(&format!("render|{file}|-o|b.png|{SMALL}|--blocks|8|--transfer|ramp|{words}"));
+        assert_eq!(out.status.code(), Some(0), "{words}: {}", text(&out.stderr));
+        text(&out.stdout)
+    };
+    let ratio = |said: &str| {
+        let line = said.lines().find(|line| line.starts_with("flat blocks")).unwrap();
+        line.rsplit("; ").next().unwrap().trim_end_matches(":1").parse::<f64>().unwrap()
+    };
+    let volume_bytes = f64::from(dims.element_product());
+    let least = |n_bytes: f64| volume_bytes / n_bytes - 0.05;
+    let mib = f64::from(1 << 20);
+    // A quarter of a store's budget is for chunks.
+    let (of_file, of_store) = (ratio(&said("b.nrrd", "--budget-mib|0.3")), ratio(&said("b.zarr", "--budget-mib|0.3")));
+    assert!(of_file >= least(0.3 * mib) && of_store >= least(0.225 * mib), "{of_file} {of_store}");
+    // A spread takes a byte for each sample of a byte.
+    let with_spreads = ratio(&said("b.nrrd", "--budget-mib|0.3|--classify|prefiltered"));
+    assert!(with_spreads >= least(0.15 * mib), "{with_spreads}");
+    // Blocks that are clipped away stay one sample.
+    let clipped = said("b.nrrd", "--budget-mib|0.3|--clip|0:30,0:90,0:80");
+    assert!(clipped.contains("1080 of level 3"), "{clipped}");
+}

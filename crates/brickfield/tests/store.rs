@@ -340,3 +340,52 @@ fn a_store_that_is_there_is_not_touched() {
     assert!(fault.to_string().contains("there is one already"), "{fault}");
     assert_eq!(folder.path().read_dir().unwrap().count(), 1);
 }
+
+#[test]
+fn voxels_that_are_not_finite_are_found_in_any_slab() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut values: Vec<f32> = (0..DIMS.element_product()).map(|i| (i % 1000) as f32).collect();
+    // In the last of three slabs alone.
+    (values[170_000], values[170_001], values[171_000]) = (f32::NAN, 5000.0, f32::INFINITY);
+    let volume = Volume::new(grid(DIMS), values.clone()).unwrap();
+    others_store(&folder.path().join("store.zarr"), DIMS, &values, &[]);
+    let found = store(folder.path(), BlockSide::V16);
+    assert_eq!(found.range(), ValueRange { min: 0.0, max: 5000.0 });
+    assert_same(&found, &blocks(&volume, BlockSide::V16), 1e-3);
+}
+
+#[test]
+fn coarse_samples_of_others_stay_in_the_range_of_their_blocks() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("store.zarr");
+    let values: Vec<f32> = (0..DIMS.element_product()).map(|i| 10.0 + (i % 7) as f32).collect();
+    others_store(&path, DIMS, &values, &[UVec3::ONE]);
+    // Another filter than the mean, which overshoots.
+    let n = (DIMS - 1) / 2 + 1;
+    let overshot: Vec<f32> = (0..n.element_product()).map(|i| if i % 2 == 0 { -50.0 } else { 90.0 }).collect();
+    write_array(&path.join("s1"), n, &overshot);
+    let found = store(folder.path(), BlockSide::V16);
+    for (block, level) in [(UVec3::ZERO, Level(1)), (UVec3::new(4, 2, 4), Level(1)), (UVec3::ZERO, Level(2))] {
+        let range = found.summaries()[found.layout().ordinal(block)].range;
+        let values = fetch_values(&found, block, level).unwrap();
+        assert!(values.iter().all(|v| range.contains(*v)), "{block} {level:?} {range:?}");
+    }
+}
+
+#[test]
+fn an_overview_is_the_finest_level_that_fits_over_the_same_box() {
+    let folder = tempfile::tempdir().unwrap();
+    let volume = Volume::new(grid(DIMS), noise(DIMS, ScalarType::U8)).unwrap();
+    packed(folder.path(), &volume, "nrrd");
+    let found = store(folder.path(), BlockSide::V16);
+    let (all, half) = (DIMS.element_product().into(), (UVec3::new(35, 19, 34).element_product()).into());
+    for (max_bytes, dims) in
+        [(all, DIMS), (all - 1, UVec3::new(35, 19, 34)), (half, UVec3::new(35, 19, 34)), (100, UVec3::new(5, 3, 5))]
+    {
+        let overview = found.overview(max_bytes).unwrap();
+        assert_eq!(overview.grid().dims(), dims, "{max_bytes}");
+        let [a, b] = [&overview, &volume].map(|v| v.grid().spacing() * v.grid().dims().as_dvec3());
+        assert!((a - b).length() < 1e-9, "{a} {b}");
+    }
+    assert_eq!(found.overview(all).unwrap().voxels(), volume.voxels());
+}

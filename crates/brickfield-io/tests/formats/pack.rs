@@ -337,3 +337,21 @@ fn slices_that_are_none_and_paths_that_are_taken_are_refused() {
     fs::create_dir(&path).unwrap();
     assert!(writer.finish().unwrap_err().to_string().contains("there is one already"));
 }
+
+/// Shards hold 512 x 512 samples of a slice.
+#[test]
+fn levels_wider_than_a_shard_are_read_as_they_were_written() {
+    for dims in [UVec3::new(530, 3, 2), UVec3::new(3, 1030, 2)] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("wide.zarr");
+        let written: Vec<u16> =
+            (0..dims.element_product()).map(|i| (i.wrapping_mul(2_654_435_761) >> 16) as u16).collect();
+        let mut writer =
+            PyramidWriter::create(&path, &grid(dims), ScalarType::U16, Level(0), &SaveOptions::default()).unwrap();
+        writer.push(Level(0), written.clone().into()).unwrap();
+        writer.finish().unwrap();
+        assert_eq!(open(&path, &OpenOptions::default()).unwrap().volume.voxels(), &Voxels::from(written.clone()));
+        let expected: Vec<u8> = written.iter().flat_map(|v| v.to_le_bytes()).collect();
+        assert_eq!(read_box(&levels(&path), 0, UVec3::ZERO, dims), expected);
+    }
+}

@@ -124,7 +124,7 @@ impl SamplingOptions {
         classification: Classification,
     ) -> Result<QuadratureRule, OptionError> {
         let narrow = match self.lengths {
-            Lengths::True => voxels.narrow_peak(&scene.transfer, self.step)?,
+            Lengths::True => voxels.narrow_peak(&scene.transfer, self.quality.step(self.step))?,
             // Only the midpoint rule has nominal lengths.
             Lengths::Nominal => None,
         };

@@ -119,7 +119,21 @@ fn equal() -> Vec<Case> {
             Setup::new(hills(&grid(), scalar), soft(scalar)).blocks(side, FlatLevels::All(Level(0)), blended(scheme))
         })
     };
+    // Short blocks at the ends; then two blocks along each axis.
+    let coarse = |name: &str, dims: UVec3| {
+        picture(&format!("blocks/all-of-level-2-{name}"), catches![shader::NEAREST], move || {
+            let grid = Grid::axis_aligned(dims, DVec3::ONE).expect("a grid");
+            let style = blended(Interblock::BoundarySplit);
+            Setup::new(hills(&grid, ScalarType::U8), soft(ScalarType::U8)).blocks(
+                BlockSide::V8,
+                FlatLevels::All(Level(2)),
+                style,
+            )
+        })
+    };
     vec![
+        coarse("short", UVec3::new(21, 27, 17)),
+        coarse("two-blocks", UVec3::splat(11)),
         case(Interblock::MinimumDistance, BlockSide::V8, ScalarType::U8),
         case(Interblock::BoundarySplit, BlockSide::V16, ScalarType::F32),
         case(Interblock::MaximumDistance, BlockSide::V8, ScalarType::U16),
