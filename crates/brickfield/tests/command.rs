@@ -218,7 +218,7 @@ fn a_store_is_drawn_like_the_file_by_the_parts_that_its_blocks_need() {
         let out = place.run(&format!("render|a.zarr|-o|b.png|{SMALL}|--blocks|8|--transfer|ramp"));
         assert_eq!(out.status.code(), Some(1));
         let said = text(&out.stderr);
-        assert!(said.contains("a.zarr: ") && said.contains("block (0, 0, 0) of level 0"), "{said}");
+        assert!(said.contains("a.zarr: ") && said.contains("[0, 0, 0] of array \"0\""), "{said}");
         assert!(!place.path().join("b.png").exists());
     }
 }
