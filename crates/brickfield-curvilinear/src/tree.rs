@@ -1,0 +1,93 @@
+//! The hierarchy: a grid, and a summary of every coarse zone over it.
+
+use brickfield_core::{Aabb, Level};
+use rayon::prelude::*;
+
+use crate::zone::corner_box;
+use crate::{CurvilinearGrid, QuadLayout, Zone, ZoneSummary, examine};
+
+/// A curvilinear grid with all its levels (Wynn et al. 1999, sections 2 and 2.1).
+///
+/// Each level above 0 is one array of summaries. Level 0 is the grid itself, and nothing is stored twice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct QuadTree {
+    grid: CurvilinearGrid,
+    /// Level 1 first.
+    levels: Vec<Vec<ZoneSummary>>,
+}
+
+/// Bytes of a hierarchy beside those of its data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub struct ByteAccount {
+    /// Zones above level 0.
+    pub n_stored_zones: usize,
+    pub bytes_per_zone: usize,
+    pub hierarchy_bytes: usize,
+    /// Positions and values of the grid.
+    pub data_bytes: usize,
+}
+
+impl QuadTree {
+    /// The hierarchy over a grid. Every node is looked at once for every level, by rayon's current thread pool.
+    pub fn build(grid: CurvilinearGrid) -> QuadTree {
+        let levels = grid.layout().levels().skip(1).map(|level| build_level(&grid, level)).collect();
+        QuadTree { grid, levels }
+    }
+
+    /// The grid below.
+    pub fn grid(&self) -> &CurvilinearGrid {
+        &self.grid
+    }
+
+    /// The addresses of zones.
+    pub fn layout(&self) -> &QuadLayout {
+        self.grid.layout()
+    }
+
+    /// The array of a level above 0, in the order of [`QuadLayout::address`]; empty for level 0.
+    pub fn summaries(&self, level: Level) -> &[ZoneSummary] {
+        usize::from(level.0).checked_sub(1).map_or(&[], |i| &self.levels[i])
+    }
+
+    /// The summary of a zone; of a final one, made from its corners.
+    #[inline]
+    pub fn summary(&self, zone: Zone) -> ZoneSummary {
+        if zone.level == Level(0) {
+            return ZoneSummary::of_final(&self.grid, &self.layout().descendants(zone));
+        }
+        self.summaries(zone.level)[self.layout().address(zone)]
+    }
+
+    /// A closed box around all nodes of a zone that are no holes.
+    pub fn extent(&self, zone: Zone) -> Aabb {
+        let around = corner_box(&self.grid, &self.layout().descendants(zone));
+        let extension = self.summary(zone).extension.as_dvec3();
+        Aabb { min: around.min - extension, max: around.max + extension }
+    }
+
+    /// How much memory the hierarchy takes.
+    pub fn byte_account(&self) -> ByteAccount {
+        let n_stored_zones = self.levels.iter().map(Vec::len).sum();
+        let bytes_per_zone = size_of::<ZoneSummary>();
+        ByteAccount {
+            n_stored_zones,
+            bytes_per_zone,
+            hierarchy_bytes: n_stored_zones * bytes_per_zone,
+            data_bytes: self.grid.n_bytes(),
+        }
+    }
+}
+
+impl ByteAccount {
+    /// Bytes of the hierarchy for each byte of the data.
+    pub fn ratio(&self) -> f64 {
+        self.hierarchy_bytes as f64 / self.data_bytes as f64
+    }
+}
+
+fn build_level(grid: &CurvilinearGrid, level: Level) -> Vec<ZoneSummary> {
+    let layout = grid.layout();
+    let summary = |address: usize| examine(grid, &layout.descendants(layout.zone_at(level, address))).0;
+    (0..layout.n_zones(level)).into_par_iter().map(summary).collect()
+}
