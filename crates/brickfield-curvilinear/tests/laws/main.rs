@@ -1,5 +1,7 @@
 //! What the hierarchy, selections and meshes must keep to, on generated grids.
 
+mod frame_rate;
 mod grids;
 mod layout;
+mod select;
 mod tree;
