@@ -214,6 +214,15 @@ impl CurvilinearGrid {
         }
     }
 
+    /// A canonical node and its copies on the other sides of seams.
+    pub(crate) fn copies(&self, node: Node) -> impl Iterator<Item = Node> + Clone + use<> {
+        let along =
+            |i: u32, n: u32, end: End| [Some(i), (end == End::Closed && i == 0).then_some(n)].into_iter().flatten();
+        let columns = along(node.column, self.n_columns(), self.ends.columns);
+        along(node.row, self.n_rows(), self.ends.rows)
+            .flat_map(move |row| columns.clone().map(move |column| Node { row, column }))
+    }
+
     /// The node so many rows and columns further; `None` beyond an open end. At most a whole closed axis further.
     pub fn moved(&self, node: Node, rows: i64, columns: i64) -> Option<Node> {
         let step = |i: u32, by: i64, n: u32, end: End| {

@@ -1,4 +1,4 @@
-//! Generated grids.
+//! Generated grids, for the tests in `src` and for those beside this file.
 
 use std::f64::consts::TAU;
 
@@ -88,4 +88,27 @@ impl Kind {
 /// All zones of a layout from level 1 on.
 pub(crate) fn coarse_zones(layout: &QuadLayout) -> impl Iterator<Item = Zone> {
     layout.levels().skip(1).flat_map(move |level| (0..layout.n_zones(level)).map(move |i| layout.zone_at(level, i)))
+}
+
+/// Nice zones that cover most of the grid, by dividing the root at random; some parts of the grid are out.
+pub(crate) fn random_leaves(tree: &QuadTree, seed: u64) -> Vec<Zone> {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    let mut dice = |n: u64| {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 20) % n
+    };
+    let (mut open, mut leaves) = (vec![tree.layout().root()], Vec::new());
+    let is_whole = dice(2) == 0;
+    while let Some(zone) = open.pop() {
+        let summary = tree.summary(zone);
+        let is_drawn = summary.is_nice() && (zone.level.0 == 0 || dice(3) == 0) && zone != tree.layout().root();
+        if is_drawn {
+            leaves.push(zone);
+        } else if !summary.is_void() && (is_whole || dice(25) > 0) {
+            open.extend(tree.layout().children(zone));
+        }
+    }
+    leaves
 }

@@ -3,5 +3,6 @@
 mod frame_rate;
 mod grids;
 mod layout;
+mod mesh;
 mod select;
 mod tree;

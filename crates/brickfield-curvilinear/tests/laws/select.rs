@@ -8,7 +8,7 @@ use brickfield_core::{Camera, Level, Projection};
 use brickfield_curvilinear::*;
 use proptest::prelude::*;
 
-pub(crate) fn view(eye: DVec3, target: DVec3) -> View {
+fn view(eye: DVec3, target: DVec3) -> View {
     let camera = Camera::look_at(eye, target, DVec3::new(0.1, 0.2, 1.0), Projection::Perspective { fov_y: 0.7 });
     View::new(camera.unwrap(), UVec2::new(400, 300)).unwrap()
 }

@@ -1,0 +1,241 @@
+//! A selection as triangles without cracks (Wynn et al. 1999, section 2.5).
+
+use std::collections::HashMap;
+
+use brickfield_core::Level;
+use brickfield_core::glam::{DVec3, Vec3};
+
+use crate::chart::{Diagonal, along_edge, corners};
+use crate::zone::lerp;
+use crate::{CurvilinearGrid, Node, Selection, Zone};
+
+/// The triangles of a selection, with a value at each vertex.
+///
+/// A vertex stands for one node of the grid, so that zones which share it share it bit by bit. Triangles are counter-clockwise where
+/// columns run to the right and rows up.
+#[derive(Clone, Debug, PartialEq, Default)]
+#[allow(missing_docs)]
+pub struct SurrogateMesh {
+    /// In the world.
+    pub positions: Vec<DVec3>,
+    pub values: Vec<f32>,
+    /// The node of each vertex. Nodes of a seam are those of the first row or column.
+    pub nodes: Vec<Node>,
+    /// Three vertices each.
+    pub triangles: Vec<[u32; 3]>,
+    /// How many vertices were moved onto the edge of a coarser zone.
+    pub n_moved: usize,
+}
+
+/// The passes that keep a mesh free of cracks. Tests leave one out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Passes {
+    Both,
+    #[cfg(test)]
+    ConstrainOnly,
+    #[cfg(test)]
+    StitchOnly,
+    #[cfg(test)]
+    Neither,
+}
+
+impl SurrogateMesh {
+    /// Positions as f32, relative to `origin`: what graphics cards take. Shared vertices stay shared.
+    pub fn positions_from(&self, origin: DVec3) -> Vec<Vec3> {
+        self.positions.iter().map(|p| (*p - origin).as_vec3()).collect()
+    }
+}
+
+/// The mesh of a selection.
+///
+/// Two passes go over the leaves, after the selection labelled them:
+///
+/// 1. *Constrain.* A vertex that lies within an edge of a coarser leaf is moved to its projection onto that edge, and takes
+///    the value that the edge has there. Coarse leaves come first, because the ends of an edge may be moved, too.
+/// 2. *Stitch.* A leaf takes up the vertices on its edges, so that both sides of an edge have the same vertices. A leaf of n
+///    such vertices has n + 2 triangles, which together are the two triangles of its quadrilateral.
+///
+/// ```text
+///  +-------+---+     v is moved onto the edge a b of the coarse leaf; then the coarse leaf has
+///  |       a   |     the triangles of its diagonal, cut at v
+///  |       v---+
+///  |       b   |
+///  +-------+---+
+/// ```
+///
+/// # Panics
+/// If the selection is one of a grid with other numbers of rows or columns.
+pub fn surrogate_mesh(grid: &CurvilinearGrid, selection: &Selection) -> SurrogateMesh {
+    assert_eq!(grid.layout(), selection.layout(), "a selection of another grid");
+    mesh_by(grid, selection, Passes::Both)
+}
+
+pub(crate) fn mesh_by(grid: &CurvilinearGrid, selection: &Selection, passes: Passes) -> SurrogateMesh {
+    let leaves = selection.leaves();
+    let mut vertices = Vertices::of(grid, &leaves);
+    let hanging = hanging_vertices(grid, selection, &vertices);
+    let (constrains, stitches) = match passes {
+        Passes::Both => (true, true),
+        #[cfg(test)]
+        Passes::ConstrainOnly => (true, false),
+        #[cfg(test)]
+        Passes::StitchOnly => (false, true),
+        #[cfg(test)]
+        Passes::Neither => (false, false),
+    };
+    if constrains {
+        hanging.iter().for_each(|vertex| vertices.constrain(grid, vertex));
+    }
+    let on_edges = if stitches { by_edge(&hanging) } else { HashMap::new() };
+    let mut mesh = SurrogateMesh { n_moved: hanging.len(), ..SurrogateMesh::default() };
+    for leaf in leaves {
+        vertices.stitch(grid, leaf, &on_edges, &mut mesh.triangles);
+    }
+    SurrogateMesh { positions: vertices.positions, values: vertices.values, nodes: vertices.nodes, ..mesh }
+}
+
+/// A vertex within an edge of a leaf.
+struct Hanging {
+    vertex: u32,
+    leaf: Zone,
+    /// Of the leaf: from corner `edge` to the next one.
+    edge: usize,
+    ends: [Node; 2],
+    /// The node of the vertex, counted as the leaf's edge counts it.
+    node: Node,
+}
+
+/// Vertices within the edge of a leaf, by leaf and edge, in order along the edge.
+type OnEdges = HashMap<(Zone, usize), Vec<u32>>;
+
+/// The corners of all leaves.
+struct Vertices {
+    positions: Vec<DVec3>,
+    values: Vec<f32>,
+    nodes: Vec<Node>,
+    of_node: HashMap<Node, u32>,
+}
+
+impl Vertices {
+    fn of(grid: &CurvilinearGrid, leaves: &[Zone]) -> Vertices {
+        let mut vertices =
+            Vertices { positions: Vec::new(), values: Vec::new(), nodes: Vec::new(), of_node: HashMap::new() };
+        for leaf in leaves {
+            for node in corners(&grid.layout().descendants(*leaf)) {
+                vertices.add(grid, grid.canonical(node));
+            }
+        }
+        vertices
+    }
+
+    fn add(&mut self, grid: &CurvilinearGrid, node: Node) {
+        let next = self.nodes.len() as u32;
+        if *self.of_node.entry(node).or_insert(next) == next {
+            self.positions.push(grid.position(node));
+            self.values.push(grid.value(node));
+            self.nodes.push(node);
+        }
+    }
+
+    fn vertex(&self, grid: &CurvilinearGrid, node: Node) -> u32 {
+        self.of_node[&grid.canonical(node)]
+    }
+
+    /// Moves a vertex onto the edge, as that is drawn. Its place along the edge is the one before any vertex was moved, which is in order
+    /// on a nice zone.
+    fn constrain(&mut self, grid: &CurvilinearGrid, hanging: &Hanging) {
+        // An edge without length has all its vertices at its first end.
+        let t = along_edge(grid, hanging.ends, hanging.node).unwrap_or(0.0);
+        let [a, b] = hanging.ends.map(|node| self.vertex(grid, node) as usize);
+        let i = hanging.vertex as usize;
+        self.positions[i] = self.positions[a] + (self.positions[b] - self.positions[a]) * t;
+        self.values[i] = lerp(f64::from(self.values[a]), f64::from(self.values[b]), t) as f32;
+    }
+
+    /// The triangles of a leaf, those on the right of its diagonal first.
+    fn stitch(&self, grid: &CurvilinearGrid, leaf: Zone, on_edges: &OnEdges, triangles: &mut Vec<[u32; 3]>) {
+        let corners = corners(&grid.layout().descendants(leaf));
+        let first = Diagonal::of(grid, &corners).first();
+        // The vertices of an edge, both ends included.
+        let edge = |i: usize| {
+            let i = (first + i) % 4;
+            let ends = [corners[i], corners[(i + 1) % 4]].map(|node| self.vertex(grid, node));
+            let within = on_edges.get(&(leaf, i)).into_iter().flatten().copied();
+            std::iter::once(ends[0]).chain(within).chain([ends[1]]).collect::<Vec<u32>>()
+        };
+        zip(&edge(0), &edge(1), triangles);
+        zip(&edge(2), &edge(3), triangles);
+    }
+}
+
+/// The triangles between two chains of vertices, the second of which goes on where the first ends: a triangle whose sides the chains are, cut
+/// at all their vertices, its third side the diagonal. No triangle has all its vertices in one chain.
+fn zip(to_apex: &[u32], from_apex: &[u32], triangles: &mut Vec<[u32; 3]>) {
+    let back: Vec<u32> = to_apex.iter().rev().copied().collect();
+    let (n, m) = (back.len() - 1, from_apex.len() - 1);
+    let (mut i, mut j) = (1, 1);
+    triangles.push([back[1], back[0], from_apex[1]]);
+    while i < n || j < m {
+        // The chain that is behind goes on.
+        if j == m || (i < n && i * m <= j * n) {
+            triangles.push([back[i + 1], back[i], from_apex[j]]);
+            i += 1;
+        } else {
+            triangles.push([back[i], from_apex[j], from_apex[j + 1]]);
+            j += 1;
+        }
+    }
+}
+
+/// The vertices that lie within an edge of a leaf, those of coarse leaves first.
+fn hanging_vertices(grid: &CurvilinearGrid, selection: &Selection, vertices: &Vertices) -> Vec<Hanging> {
+    let of = |(vertex, node): (usize, &Node)| {
+        let cells = [(-1, -1), (-1, 0), (0, -1), (0, 0)];
+        cells.into_iter().find_map(|cell| hanging_on(grid, selection, vertex as u32, *node, cell))
+    };
+    let mut hanging: Vec<Hanging> = vertices.nodes.iter().enumerate().filter_map(of).collect();
+    hanging.sort_by_key(|h| (std::cmp::Reverse(h.leaf), h.edge, h.node.row, h.node.column));
+    hanging
+}
+
+/// The leaf over one of the four final zones around a node, if the node lies within an edge of the leaf. (No node lies within edges of two
+/// leaves: one would have both zones above the node, say, and the other both on its left.)
+fn hanging_on(
+    grid: &CurvilinearGrid,
+    selection: &Selection,
+    vertex: u32,
+    node: Node,
+    cell: (i64, i64),
+) -> Option<Hanging> {
+    let cell = grid.moved(node, cell.0, cell.1)?;
+    if cell.row == grid.n_rows() || cell.column == grid.n_columns() {
+        return None;
+    }
+    let leaf = selection.leaf_over(cell.row, cell.column).filter(|leaf| leaf.level > Level(0))?;
+    let corners = corners(&grid.layout().descendants(leaf));
+    (0..4).find_map(|edge| {
+        let ends = [corners[edge], corners[(edge + 1) % 4]];
+        let node = within(grid, ends, node)?;
+        Some(Hanging { vertex, leaf, edge, ends, node })
+    })
+}
+
+/// A node, or its copy on the other side of a seam, that lies between the ends of an edge.
+fn within(grid: &CurvilinearGrid, [a, b]: [Node; 2], node: Node) -> Option<Node> {
+    let is_between = |i: u32, a: u32, b: u32| i > a.min(b) && i < a.max(b);
+    grid.copies(node).find(|n| {
+        (a.row == b.row && n.row == a.row && is_between(n.column, a.column, b.column))
+            || (a.column == b.column && n.column == a.column && is_between(n.row, a.row, b.row))
+    })
+}
+
+/// From the first end of each edge to the second.
+fn by_edge(hanging: &[Hanging]) -> OnEdges {
+    let mut on_edges = OnEdges::new();
+    let mut sorted: Vec<&Hanging> = hanging.iter().collect();
+    sorted.sort_by_key(|h| h.node.row.abs_diff(h.ends[0].row) + h.node.column.abs_diff(h.ends[0].column));
+    for h in sorted {
+        on_edges.entry((h.leaf, h.edge)).or_default().push(h.vertex);
+    }
+    on_edges
+}
