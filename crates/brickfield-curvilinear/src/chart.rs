@@ -10,36 +10,45 @@ pub(crate) fn corners(range: &ZoneRange) -> [Node; 4] {
     [(top, left), (top, right), (bottom, right), (bottom, left)].map(|(row, column)| Node { row, column })
 }
 
-/// The diagonal that cuts a zone into the two triangles that are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Diagonal {
-    /// From corner 0 to corner 2.
-    Main,
-    /// From corner 1 to corner 3.
-    Other,
+/// The corners of a zone with their positions and values.
+pub(crate) struct Quad {
+    pub(crate) nodes: [Node; 4],
+    pub(crate) positions: [DVec3; 4],
+    /// NaN for a hole.
+    pub(crate) values: [f64; 4],
 }
 
-impl Diagonal {
-    /// The shorter one. Height fields and ties: the main one.
-    pub(crate) fn of(grid: &CurvilinearGrid, corners: &[Node; 4]) -> Diagonal {
-        let [main, other] = diagonals(grid, corners);
-        let is_flat = matches!(grid.positions(), Positions::Heights(_));
-        if !is_flat && other < main { Diagonal::Other } else { Diagonal::Main }
-    }
-
-    /// The corner with which the corners are to be read on, so that the diagonal is the one from the first to the third.
-    pub(crate) fn first(self) -> usize {
-        match self {
-            Diagonal::Main => 0,
-            Diagonal::Other => 1,
+impl Quad {
+    pub(crate) fn of(grid: &CurvilinearGrid, range: &ZoneRange) -> Quad {
+        let nodes = corners(range);
+        Quad {
+            nodes,
+            positions: nodes.map(|node| grid.position(node)),
+            values: nodes.map(|node| f64::from(grid.value(node))),
         }
     }
-}
 
-/// The lengths of both diagonals, in world units.
-pub(crate) fn diagonals(grid: &CurvilinearGrid, corners: &[Node; 4]) -> [f64; 2] {
-    let p = corners.map(|node| grid.position(node));
-    [p[0].distance(p[2]), p[1].distance(p[3])]
+    /// The lengths of both diagonals, in world units.
+    fn diagonals(&self) -> [f64; 2] {
+        let p = &self.positions;
+        [p[0].distance(p[2]), p[1].distance(p[3])]
+    }
+
+    /// The length of the shorter diagonal.
+    pub(crate) fn size(&self) -> f64 {
+        let [main, other] = self.diagonals();
+        main.min(other)
+    }
+
+    /// The diagonal that cuts the zone into the two triangles that are drawn: the shorter one; in height fields, and of two equal ones,
+    /// that from corner 0 to corner 2. The result is the corner, 0 or 1, at which it begins.
+    pub(crate) fn cut(&self, grid: &CurvilinearGrid) -> usize {
+        let [main, other] = match grid.positions() {
+            Positions::Heights(_) => return 0,
+            Positions::Curvilinear(_) | Positions::Offsets { .. } => self.diagonals(),
+        };
+        usize::from(other < main)
+    }
 }
 
 /// How far along the edge from node `a` to node `b` a node lies: 0 at `a`, 1 at `b`.
@@ -69,11 +78,11 @@ pub(crate) enum Chart {
 
 impl Chart {
     /// `None` if the zone's diagonals are parallel, or one has no length.
-    pub(crate) fn of(grid: &CurvilinearGrid, corners: &[Node; 4]) -> Option<Chart> {
+    pub(crate) fn of(grid: &CurvilinearGrid, quad: &Quad) -> Option<Chart> {
         if let Positions::Heights(_) = grid.positions() {
             return Some(Chart::Index);
         }
-        let p = corners.map(|node| grid.position(node));
+        let p = &quad.positions;
         let x = (p[2] - p[0]).try_normalize()?;
         let normal = x.cross((p[3] - p[1]).try_normalize()?).try_normalize()?;
         Some(Chart::Plane { origin: p[0], axes: [x, normal.cross(x)] })
@@ -101,9 +110,9 @@ pub(crate) struct DrawnZone {
 }
 
 impl DrawnZone {
-    /// `None` if the quadrilateral is not convex, so that a triangle would lie outside of it.
-    pub(crate) fn new(corners: [DVec2; 4], values: [f64; 4], diagonal: Diagonal) -> Option<DrawnZone> {
-        let at = |i: usize| (corners[(i + diagonal.first()) % 4], values[(i + diagonal.first()) % 4]);
+    /// Cut along the diagonal that begins at corner `cut`. `None` if the quadrilateral is not convex, so that a triangle would lie outside of it.
+    pub(crate) fn new(corners: [DVec2; 4], values: [f64; 4], cut: usize) -> Option<DrawnZone> {
+        let at = |i: usize| (corners[(i + cut) % 4], values[(i + cut) % 4]);
         let (p, v): ([DVec2; 4], [f64; 4]) = (std::array::from_fn(|i| at(i).0), std::array::from_fn(|i| at(i).1));
         let is_convex = (0..4).all(|i| (p[(i + 1) % 4] - p[i]).perp_dot(p[(i + 2) % 4] - p[(i + 1) % 4]) > 0.0);
         let gradient = |b: usize, c: usize| {

@@ -1,11 +1,11 @@
 //! A selection as triangles without cracks (Wynn et al. 1999, section 2.5).
 
-use std::collections::HashMap;
-
 use brickfield_core::Level;
 use brickfield_core::glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
-use crate::chart::{Diagonal, along_edge, corners};
+use crate::chart::{Quad, along_edge, corners};
+use crate::select::ZoneMap;
 use crate::zone::lerp;
 use crate::{CurvilinearGrid, Node, Selection, Zone};
 
@@ -86,12 +86,10 @@ pub(crate) fn mesh_by(grid: &CurvilinearGrid, selection: &Selection, passes: Pas
     if constrains {
         hanging.iter().for_each(|vertex| vertices.constrain(grid, vertex));
     }
-    let on_edges = if stitches { by_edge(&hanging) } else { HashMap::new() };
-    let mut mesh = SurrogateMesh { n_moved: hanging.len(), ..SurrogateMesh::default() };
-    for leaf in leaves {
-        vertices.stitch(grid, leaf, &on_edges, &mut mesh.triangles);
-    }
-    SurrogateMesh { positions: vertices.positions, values: vertices.values, nodes: vertices.nodes, ..mesh }
+    let on_edges = if stitches { by_edge(&hanging) } else { ZoneMap::default() };
+    let triangles = leaves.par_iter().flat_map_iter(|leaf| vertices.stitch(grid, *leaf, &on_edges)).collect();
+    let Vertices { positions, values, nodes, .. } = vertices;
+    SurrogateMesh { positions, values, nodes, triangles, n_moved: hanging.len() }
 }
 
 /// A vertex within an edge of a leaf.
@@ -106,20 +104,20 @@ struct Hanging {
 }
 
 /// Vertices within the edge of a leaf, by leaf and edge, in order along the edge.
-type OnEdges = HashMap<(Zone, usize), Vec<u32>>;
+type OnEdges = ZoneMap<(Zone, usize), Vec<u32>>;
 
 /// The corners of all leaves.
 struct Vertices {
     positions: Vec<DVec3>,
     values: Vec<f32>,
     nodes: Vec<Node>,
-    of_node: HashMap<Node, u32>,
+    of_node: ZoneMap<Node, u32>,
 }
 
 impl Vertices {
     fn of(grid: &CurvilinearGrid, leaves: &[Zone]) -> Vertices {
         let mut vertices =
-            Vertices { positions: Vec::new(), values: Vec::new(), nodes: Vec::new(), of_node: HashMap::new() };
+            Vertices { positions: Vec::new(), values: Vec::new(), nodes: Vec::new(), of_node: ZoneMap::default() };
         for leaf in leaves {
             for node in corners(&grid.layout().descendants(*leaf)) {
                 vertices.add(grid, grid.canonical(node));
@@ -153,18 +151,20 @@ impl Vertices {
     }
 
     /// The triangles of a leaf, those on the right of its diagonal first.
-    fn stitch(&self, grid: &CurvilinearGrid, leaf: Zone, on_edges: &OnEdges, triangles: &mut Vec<[u32; 3]>) {
-        let corners = corners(&grid.layout().descendants(leaf));
-        let first = Diagonal::of(grid, &corners).first();
+    fn stitch(&self, grid: &CurvilinearGrid, leaf: Zone, on_edges: &OnEdges) -> Vec<[u32; 3]> {
+        let quad = Quad::of(grid, &grid.layout().descendants(leaf));
+        let first = quad.cut(grid);
         // The vertices of an edge, both ends included.
         let edge = |i: usize| {
             let i = (first + i) % 4;
-            let ends = [corners[i], corners[(i + 1) % 4]].map(|node| self.vertex(grid, node));
+            let ends = [quad.nodes[i], quad.nodes[(i + 1) % 4]].map(|node| self.vertex(grid, node));
             let within = on_edges.get(&(leaf, i)).into_iter().flatten().copied();
             std::iter::once(ends[0]).chain(within).chain([ends[1]]).collect::<Vec<u32>>()
         };
-        zip(&edge(0), &edge(1), triangles);
-        zip(&edge(2), &edge(3), triangles);
+        let mut triangles = Vec::new();
+        zip(&edge(0), &edge(1), &mut triangles);
+        zip(&edge(2), &edge(3), &mut triangles);
+        triangles
     }
 }
 
@@ -193,7 +193,7 @@ fn hanging_vertices(grid: &CurvilinearGrid, selection: &Selection, vertices: &Ve
         let cells = [(-1, -1), (-1, 0), (0, -1), (0, 0)];
         cells.into_iter().find_map(|cell| hanging_on(grid, selection, vertex as u32, *node, cell))
     };
-    let mut hanging: Vec<Hanging> = vertices.nodes.iter().enumerate().filter_map(of).collect();
+    let mut hanging: Vec<Hanging> = vertices.nodes.par_iter().enumerate().filter_map(of).collect();
     hanging.sort_by_key(|h| (std::cmp::Reverse(h.leaf), h.edge, h.node.row, h.node.column));
     hanging
 }
@@ -231,7 +231,7 @@ fn within(grid: &CurvilinearGrid, [a, b]: [Node; 2], node: Node) -> Option<Node>
 
 /// From the first end of each edge to the second.
 fn by_edge(hanging: &[Hanging]) -> OnEdges {
-    let mut on_edges = OnEdges::new();
+    let mut on_edges = OnEdges::default();
     let mut sorted: Vec<&Hanging> = hanging.iter().collect();
     sorted.sort_by_key(|h| h.node.row.abs_diff(h.ends[0].row) + h.node.column.abs_diff(h.ends[0].column));
     for h in sorted {

@@ -3,7 +3,7 @@
 use brickfield_core::{Aabb, Level};
 use rayon::prelude::*;
 
-use crate::zone::corner_box;
+use crate::chart::Quad;
 use crate::{CurvilinearGrid, QuadLayout, Zone, ZoneSummary, examine};
 
 /// A curvilinear grid with all its levels (Wynn et al. 1999, sections 2 and 2.1).
@@ -61,7 +61,7 @@ impl QuadTree {
 
     /// A closed box around all nodes of a zone that are no holes.
     pub fn extent(&self, zone: Zone) -> Aabb {
-        let around = corner_box(&self.grid, &self.layout().descendants(zone));
+        let around = Aabb::of_points(Quad::of(&self.grid, &self.layout().descendants(zone)).positions);
         let extension = self.summary(zone).extension.as_dvec3();
         Aabb { min: around.min - extension, max: around.max + extension }
     }

@@ -4,7 +4,7 @@ use brickfield_core::Aabb;
 use brickfield_core::glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::chart::{Chart, Diagonal, DrawnZone, along_edge, corners, diagonals};
+use crate::chart::{Chart, DrawnZone, Quad, along_edge};
 use crate::{CurvilinearGrid, Node, Positions, ZoneRange};
 
 /// What the hierarchy knows of a zone: 24 bytes, stored for every zone above level 0 (Wynn et al. 1999, section 3).
@@ -56,46 +56,38 @@ impl ZoneSummary {
 
     /// The summary of a final zone, which is the data itself: without extension and error.
     pub fn of_final(grid: &CurvilinearGrid, range: &ZoneRange) -> ZoneSummary {
-        let corners = corners(range);
-        let [main, other] = diagonals(grid, &corners);
-        let value = corners.map(|node| f64::from(grid.value(node))).iter().sum::<f64>() * 0.25;
-        ZoneSummary { extension: Vec3::ZERO, value: value as f32, error: 0.0, size: main.min(other) as f32 }
+        let quad = Quad::of(grid, range);
+        let value = quad.values.iter().sum::<f64>() * 0.25;
+        ZoneSummary { extension: Vec3::ZERO, value: value as f32, error: 0.0, size: quad.size() as f32 }
     }
-}
-
-/// The box around the four corners of a zone.
-pub(crate) fn corner_box(grid: &CurvilinearGrid, range: &ZoneRange) -> Aabb {
-    Aabb::of_points(corners(range).map(|node| grid.position(node)))
 }
 
 /// Looks at every node of a zone: its summary, and whether it may be drawn coarse.
 ///
 /// `range` is that of a zone above level 0. A zone of many nodes is looked at by several threads, with the same result.
 pub fn examine(grid: &CurvilinearGrid, range: &ZoneRange) -> (ZoneSummary, Niceness) {
-    let corners = corners(range);
-    let drawn = drawn_zone(grid, &corners);
+    let quad = Quad::of(grid, range);
+    let drawn = drawn_zone(grid, &quad);
     let inner = scan(grid, range, drawn.as_ref());
-    let edges = drawn.as_ref().map(|(chart, _)| examine_edges(grid, range, chart));
+    let edges = drawn.as_ref().map(|(chart, _)| examine_edges(grid, &quad, chart));
     let niceness = niceness(&inner, edges.as_ref());
     let error = match (niceness, edges) {
         (Niceness::Nice, Some(Ok(of_edges))) => rounded_up(inner.error.max(of_edges)),
         _ => f32::INFINITY,
     };
-    let [main, other] = diagonals(grid, &corners);
     let summary = ZoneSummary {
-        extension: extension(grid, range, &inner),
+        extension: extension(grid, &quad, &inner),
         value: (inner.sum / inner.n_drawn as f64) as f32,
         error,
-        size: main.min(other) as f32,
+        size: quad.size() as f32,
     };
     (summary, niceness)
 }
 
-fn drawn_zone(grid: &CurvilinearGrid, corners: &[Node; 4]) -> Option<(Chart, DrawnZone)> {
-    let chart = Chart::of(grid, corners)?;
-    let flat = corners.map(|node| chart.at(grid, node));
-    let values = corners.map(|node| f64::from(grid.value(node)));
-    let drawn = DrawnZone::new(flat, values, Diagonal::of(grid, corners))?;
+fn drawn_zone(grid: &CurvilinearGrid, quad: &Quad) -> Option<(Chart, DrawnZone)> {
+    let chart = Chart::of(grid, quad)?;
+    let flat = quad.nodes.map(|node| chart.at(grid, node));
+    let drawn = DrawnZone::new(flat, quad.values, quad.cut(grid))?;
     Some((chart, drawn))
 }
 
@@ -145,18 +137,30 @@ fn scan(grid: &CurvilinearGrid, range: &ZoneRange, drawn: Option<&(Chart, DrawnZ
 /// Looks at the rows of final zones of a band, and at the nodes of each row of nodes that the band has above its end.
 fn scan_rows(grid: &CurvilinearGrid, whole: &ZoneRange, band: &ZoneRange, drawn: Option<&(Chart, DrawnZone)>) -> Scan {
     let mut scan = Scan::NOTHING;
-    let last = if band.rows.end == whole.rows.end { band.rows.end } else { band.rows.end - 1 };
-    for row in band.rows.start..=last {
-        let is_inner_row = row > whole.rows.start && row < whole.rows.end;
-        scan.add_extent(grid, row, whole);
-        if let Some((chart, drawn)) = drawn.filter(|_| is_inner_row) {
-            scan.add_errors(grid, row, whole, chart, drawn);
+    let columns = whole.columns.start..whole.columns.end + 1;
+    let (mut above, mut sum_above) = (&[][..], 0.0);
+    for row in band.rows.start..=band.rows.end {
+        let values = grid.row_values(row, columns.clone());
+        let sum = trapezium_sum(values);
+        if row > band.rows.start {
+            scan.add_means([above, values], [sum_above, sum]);
         }
-        if row < band.rows.end {
-            scan.add_means(grid, row, whole);
+        (above, sum_above) = (values, sum);
+        if row < band.rows.end || row == whole.rows.end {
+            scan.has_hole |= sum.is_nan();
+            scan.add_extent(grid, row, columns.start, values);
+            if let Some((chart, drawn)) = drawn.filter(|_| row > whole.rows.start && row < whole.rows.end) {
+                scan.add_errors(grid, row, columns.start, values, chart, drawn);
+            }
         }
     }
     scan
+}
+
+/// The sum of the means of each two neighbours; NaN if there is a hole.
+fn trapezium_sum(values: &[f32]) -> f64 {
+    let (first, last) = (f64::from(values[0]), f64::from(values[values.len() - 1]));
+    values.iter().map(|v| f64::from(*v)).sum::<f64>() - 0.5 * (first + last)
 }
 
 impl Scan {
@@ -182,9 +186,7 @@ impl Scan {
         }
     }
 
-    fn add_extent(&mut self, grid: &CurvilinearGrid, row: u32, range: &ZoneRange) {
-        let values = grid.row_values(row, range.columns.start..range.columns.end + 1);
-        self.has_hole |= values.iter().any(|v| v.is_nan());
+    fn add_extent(&mut self, grid: &CurvilinearGrid, row: u32, first: u32, values: &[f32]) {
         if let Positions::Heights(_) = grid.positions() {
             // `min` and `max` pass over NaN.
             let low = values.iter().fold(f32::INFINITY, |low, v| low.min(*v));
@@ -193,7 +195,7 @@ impl Scan {
             self.high.x = self.high.x.max(f64::from(high));
             return;
         }
-        for (column, value) in (range.columns.start..).zip(values) {
+        for (column, value) in (first..).zip(values) {
             if !value.is_nan() {
                 let p = grid.position(Node { row, column });
                 (self.low, self.high) = (self.low.min(p), self.high.max(p));
@@ -201,31 +203,47 @@ impl Scan {
         }
     }
 
-    fn add_errors(&mut self, grid: &CurvilinearGrid, row: u32, range: &ZoneRange, chart: &Chart, drawn: &DrawnZone) {
-        let inner = range.columns.start + 1..range.columns.end;
-        let (mut error, mut is_outside) = (self.error, self.is_outside);
-        for (column, value) in inner.clone().zip(grid.row_values(row, inner)) {
-            let at = chart.at(grid, Node { row, column });
-            // A hole has no deviation: `max` passes over NaN.
-            error = error.max((f64::from(*value) - drawn.value(at)).abs());
-            is_outside |= matches!(chart, Chart::Plane { .. }) && !drawn.contains(at);
+    /// The deviations of the nodes within a row. A hole has none: `max` passes over NaN.
+    fn add_errors(
+        &mut self,
+        grid: &CurvilinearGrid,
+        row: u32,
+        first: u32,
+        values: &[f32],
+        chart: &Chart,
+        drawn: &DrawnZone,
+    ) {
+        let inner = (first + 1..).zip(&values[1..values.len() - 1]);
+        let mut error = self.error;
+        match chart {
+            Chart::Index => inner.for_each(|(column, value)| {
+                let at = DVec2::new(f64::from(column), f64::from(row));
+                error = error.max((f64::from(*value) - drawn.value(at)).abs());
+            }),
+            Chart::Plane { .. } => inner.for_each(|(column, value)| {
+                let at = chart.at(grid, Node { row, column });
+                error = error.max((f64::from(*value) - drawn.value(at)).abs());
+                self.is_outside |= !drawn.contains(at);
+            }),
         }
-        (self.error, self.is_outside) = (error, is_outside);
+        self.error = error;
     }
 
-    fn add_means(&mut self, grid: &CurvilinearGrid, row: u32, range: &ZoneRange) {
-        let columns = range.columns.start..range.columns.end + 1;
-        let (above, below) = (grid.row_values(row, columns.clone()), grid.row_values(row + 1, columns));
-        let (mut sum, mut n_drawn) = (0.0, 0);
+    /// The means of the final zones between two rows of nodes, whose trapezium sums are known.
+    fn add_means(&mut self, [above, below]: [&[f32]; 2], [sum_above, sum_below]: [f64; 2]) {
+        let sum = 0.5 * (sum_above + sum_below);
+        if !sum.is_nan() {
+            self.sum += sum;
+            self.n_drawn += above.len() as u64 - 1;
+            return;
+        }
         for (a, b) in above.windows(2).zip(below.windows(2)) {
             let mean = (f64::from(a[0]) + f64::from(a[1]) + f64::from(b[0]) + f64::from(b[1])) * 0.25;
             if !mean.is_nan() {
-                sum += mean;
-                n_drawn += 1;
+                self.sum += mean;
+                self.n_drawn += 1;
             }
         }
-        self.sum += sum;
-        self.n_drawn += n_drawn;
     }
 }
 
@@ -233,11 +251,10 @@ impl Scan {
 ///
 /// # Errors
 /// [`Niceness::EdgeTurnsBack`], [`Niceness::NeighbourInside`].
-fn examine_edges(grid: &CurvilinearGrid, range: &ZoneRange, chart: &Chart) -> Result<f64, Niceness> {
-    let corners = corners(range);
+fn examine_edges(grid: &CurvilinearGrid, quad: &Quad, chart: &Chart) -> Result<f64, Niceness> {
     let mut error: f64 = 0.0;
     for i in 0..4 {
-        let ends = [corners[i], corners[(i + 1) % 4]];
+        let ends = [quad.nodes[i], quad.nodes[(i + 1) % 4]];
         // The step from an edge to the zones beyond it.
         let beyond = [(-1, 0), (0, 1), (1, 0), (0, -1)][i];
         error = error.max(examine_edge(grid, ends, beyond, chart)?);
@@ -254,8 +271,11 @@ fn examine_edge(grid: &CurvilinearGrid, ends: [Node; 2], beyond: (i64, i64), cha
         let t = along_edge(grid, ends, node).filter(|t| *t > last && *t < 1.0).ok_or(Niceness::EdgeTurnsBack)?;
         last = t;
         error = error.max((f64::from(grid.value(node)) - lerp(from, to, t)).abs());
+        if matches!(chart, Chart::Index) {
+            continue;
+        }
         let Some(next) = grid.moved(node, beyond.0, beyond.1) else { continue };
-        if matches!(chart, Chart::Plane { .. }) && !grid.value(next).is_nan() && is_inside(chart.at(grid, next)) {
+        if !grid.value(next).is_nan() && is_inside(chart.at(grid, next)) {
             return Err(Niceness::NeighbourInside);
         }
     }
@@ -283,17 +303,17 @@ pub(crate) fn lerp(from: f64, to: f64, t: f64) -> f64 {
     from + (to - from) * t
 }
 
-fn extension(grid: &CurvilinearGrid, range: &ZoneRange, scan: &Scan) -> Vec3 {
+fn extension(grid: &CurvilinearGrid, quad: &Quad, scan: &Scan) -> Vec3 {
     let (low, high) = match grid.positions() {
         _ if scan.low.x > scan.high.x => return Vec3::ZERO,
         Positions::Heights(field) => {
-            let ends = corners(range).map(|node| [scan.low.x, scan.high.x].map(|value| field.at(node, value)));
+            let ends = quad.nodes.map(|node| [scan.low.x, scan.high.x].map(|value| field.at(node, value)));
             let around = Aabb::of_points(ends.into_iter().flatten());
             (around.min, around.max)
         }
         Positions::Curvilinear(_) | Positions::Offsets { .. } => (scan.low, scan.high),
     };
-    let inner = corner_box(grid, range);
+    let inner = Aabb::of_points(quad.positions);
     let beyond = (inner.min - low).max(high - inner.max);
     // The box is made by a sum, which rounds: room for that, too.
     let room = low.abs().max(high.abs()).max(inner.min.abs()).max(inner.max.abs()) * f64::EPSILON;

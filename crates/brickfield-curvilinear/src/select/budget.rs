@@ -1,9 +1,9 @@
 //! The least error under a polygon budget (Wynn et al. 1999, section 2.4).
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::{Label, Selection, SelectionWork};
+use super::{Label, Selection, SelectionWork, ZoneMap};
 use crate::{QuadTree, View, Zone};
 use brickfield_core::Level;
 
@@ -22,7 +22,7 @@ pub struct BudgetSelector {
     view: Option<View>,
     odometer: f64,
     selection: Selection,
-    ranks: HashMap<Zone, Rank, std::hash::BuildHasherDefault<super::ZoneHasher>>,
+    ranks: ZoneMap<Zone, Rank>,
     /// Leaves that may be divided.
     candidates: BTreeSet<Turn>,
     /// Zones that are divided for their error, with the number of zones that they add.
@@ -73,7 +73,7 @@ impl BudgetSelector {
             view: None,
             odometer: 0.0,
             selection,
-            ranks: HashMap::default(),
+            ranks: ZoneMap::default(),
             candidates: BTreeSet::new(),
             divided: BTreeMap::new(),
             n_zones: 0,

@@ -26,7 +26,7 @@ pub enum Label {
 #[derive(Clone, Debug)]
 pub struct Selection {
     layout: QuadLayout,
-    entries: HashMap<Zone, Entry, BuildHasherDefault<ZoneHasher>>,
+    entries: ZoneMap<Zone, Entry>,
     n_leaves: usize,
 }
 
@@ -104,12 +104,13 @@ impl Selection {
 
     /// The zone that draws a final zone.
     pub fn leaf_over(&self, row: u32, column: u32) -> Option<Zone> {
-        for level in self.layout.levels().rev() {
+        // Of all zones over a final zone, the finest one with a label is no branch.
+        for level in self.layout.levels() {
             let zone = self.layout.ancestor(level, row, column);
-            match self.label(zone)? {
-                Label::Leaf => return Some(zone),
-                Label::Branch => {}
-                Label::Out => return None,
+            match self.label(zone) {
+                Some(Label::Leaf) => return Some(zone),
+                Some(Label::Branch | Label::Out) => return None,
+                None => {}
             }
         }
         None
@@ -126,7 +127,7 @@ impl Selection {
     }
 
     fn empty(layout: QuadLayout) -> Selection {
-        Selection { layout, entries: HashMap::default(), n_leaves: 0 }
+        Selection { layout, entries: ZoneMap::default(), n_leaves: 0 }
     }
 
     fn set(&mut self, zone: Zone, label: Label, expiry: f64) {
@@ -190,9 +191,12 @@ impl PartialEq for Selection {
     }
 }
 
-/// A short hash for zones, the same in every run.
+/// A map from zones or nodes, with a short hash that is the same in every run.
+pub(crate) type ZoneMap<K, V> = HashMap<K, V, BuildHasherDefault<ZoneHasher>>;
+
+/// The hash of a [`ZoneMap`].
 #[derive(Default)]
-struct ZoneHasher(u64);
+pub(crate) struct ZoneHasher(u64);
 
 impl Hasher for ZoneHasher {
     fn finish(&self) -> u64 {
@@ -205,6 +209,10 @@ impl Hasher for ZoneHasher {
 
     fn write_u8(&mut self, i: u8) {
         self.write_u32(u32::from(i));
+    }
+
+    fn write_usize(&mut self, i: usize) {
+        self.write_u32(i as u32);
     }
 
     fn write_u32(&mut self, i: u32) {
