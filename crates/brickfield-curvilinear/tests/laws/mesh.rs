@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::grids::{KINDS, Kind, random_leaves};
-use brickfield_core::glam::{DVec3, UVec2};
+use brickfield_core::glam::{DVec2, DVec3, UVec2};
 use brickfield_core::{Camera, Level};
 use brickfield_curvilinear::*;
 use proptest::prelude::*;
@@ -43,22 +43,57 @@ proptest! {
     }
 
     #[test]
-    fn meshes_are_as_far_from_the_data_as_their_zones_say(kind in kinds(), m in 3u32..40, n in 3u32..40, seed in 0u64..u64::MAX) {
-        let tree = QuadTree::build(kind.grid(m, n));
-        let selection = Selection::of_leaves(&tree, random_leaves(&tree, seed)).unwrap();
-        let mesh = surrogate_mesh(tree.grid(), &selection);
-        // A vertex is on an edge of a coarser zone, whose ends may be on edges of coarser ones: one error for each level.
-        let mut errors = vec![0.0f32; usize::from(tree.layout().top().0) + 1];
-        for leaf in selection.leaves() {
-            let error = &mut errors[usize::from(leaf.level.0)];
-            *error = error.max(tree.summary(leaf).error);
-        }
-        let bound: f32 = errors.iter().sum();
+    fn vertices_are_as_far_from_the_data_as_their_zones_say(
+        kind in kinds(), m in 3u32..40, n in 3u32..40, seed in 0u64..u64::MAX,
+    ) {
+        let (tree, mesh, bound) = patched(kind, m, n, seed);
         for (node, value) in mesh.nodes.iter().zip(&mesh.values) {
             let deviation = (tree.grid().value(*node) - value).abs();
             prop_assert!(deviation <= bound + 1e-6, "{deviation} > {bound}");
         }
     }
+
+    #[test]
+    fn all_nodes_of_height_fields_are(m in 3u32..40, n in 3u32..40, seed in 0u64..u64::MAX) {
+        let (tree, mesh, bound) = patched(Kind::Waves, m, n, seed);
+        for triangle in &mesh.triangles {
+            for (node, drawn) in drawn_nodes(&mesh, *triangle) {
+                let deviation = (f64::from(tree.grid().value(node)) - drawn).abs();
+                prop_assert!(deviation <= f64::from(bound) + 1e-6, "{deviation} > {bound}");
+            }
+        }
+    }
+}
+
+/// A mesh, and how far it may be from the data: a vertex may lie on an edge of a coarser zone, whose ends may lie on edges of coarser ones, so
+/// that one error counts for each level.
+fn patched(kind: Kind, m: u32, n: u32, seed: u64) -> (QuadTree, SurrogateMesh, f32) {
+    let tree = QuadTree::build(kind.grid(m, n));
+    let selection = Selection::of_leaves(&tree, random_leaves(&tree, seed)).unwrap();
+    let mesh = surrogate_mesh(tree.grid(), &selection);
+    let mut errors = vec![0.0f32; usize::from(tree.layout().top().0) + 1];
+    for leaf in selection.leaves() {
+        let error = &mut errors[usize::from(leaf.level.0)];
+        *error = error.max(tree.summary(leaf).error);
+    }
+    let bound = errors.iter().sum();
+    (tree, mesh, bound)
+}
+
+/// The nodes under a triangle of a height field's mesh, with the values that are drawn there.
+fn drawn_nodes(mesh: &SurrogateMesh, triangle: [u32; 3]) -> Vec<(Node, f64)> {
+    let p = triangle.map(|v| mesh.nodes[v as usize]).map(|n| DVec2::new(f64::from(n.column), f64::from(n.row)));
+    let v = triangle.map(|v| f64::from(mesh.values[v as usize]));
+    let area = |a: DVec2, b: DVec2, c: DVec2| (b - a).perp_dot(c - a);
+    let (low, high) = (p[0].min(p[1]).min(p[2]).as_uvec2(), p[0].max(p[1]).max(p[2]).as_uvec2());
+    let nodes = (low.y..=high.y).flat_map(|row| (low.x..=high.x).map(move |column| Node { row, column }));
+    let drawn = |node: Node| {
+        let at = DVec2::new(f64::from(node.column), f64::from(node.row));
+        let weights = [area(at, p[1], p[2]), area(p[0], at, p[2]), area(p[0], p[1], at)];
+        let value = (0..3).map(|i| weights[i] * v[i]).sum::<f64>() / area(p[0], p[1], p[2]);
+        weights.iter().all(|weight| *weight >= 0.0).then_some((node, value))
+    };
+    nodes.filter_map(drawn).collect()
 }
 
 #[test]
