@@ -15,6 +15,7 @@ mod frame_rate;
 mod grid;
 mod layout;
 mod mesh;
+mod octree;
 mod select;
 mod tree;
 mod view;
@@ -26,6 +27,7 @@ pub use frame_rate::{FeedbackBudget, FrameTarget, FrameTime, FrameTimeError, Pre
 pub use grid::{CurvilinearGrid, CurvilinearGridError, End, GridEnds, HeightField, Node, Positions, hgt_value};
 pub use layout::{LayoutError, QuadLayout, Zone, ZoneRange};
 pub use mesh::{SurrogateMesh, surrogate_mesh};
+pub use octree::{CellBox, OctLayout, OctLayoutError, OctZone};
 pub use select::{BudgetSelector, GranularityError, Label, Selection, SelectionError, SelectionWork, SizeSelector};
 pub use tree::{ByteAccount, QuadTree};
 pub use view::{View, ViewError};

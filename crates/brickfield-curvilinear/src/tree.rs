@@ -8,11 +8,12 @@ use crate::{CurvilinearGrid, QuadLayout, Zone, ZoneSummary, examine};
 
 /// A curvilinear grid with all its levels (Wynn et al. 1999, sections 2 and 2.1).
 ///
-/// Each level above 0 is one array of summaries. Level 0 is the grid itself, and nothing is stored twice.
+/// Each level from [`FIRST_STORED`](Self::FIRST_STORED) on is one array of summaries. Three quarters of all coarse zones are of level 1 and have
+/// nine nodes: their summaries are made when they are asked for, as those of final zones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct QuadTree {
     grid: CurvilinearGrid,
-    /// Level 1 first.
+    /// The first stored level first.
     levels: Vec<Vec<ZoneSummary>>,
 }
 
@@ -20,7 +21,7 @@ pub struct QuadTree {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub struct ByteAccount {
-    /// Zones above level 0.
+    /// Zones from [`QuadTree::FIRST_STORED`] on.
     pub n_stored_zones: usize,
     pub bytes_per_zone: usize,
     pub hierarchy_bytes: usize,
@@ -29,9 +30,13 @@ pub struct ByteAccount {
 }
 
 impl QuadTree {
-    /// The hierarchy over a grid. Every node is looked at once for every level, by rayon's current thread pool.
+    /// The finest level with stored summaries.
+    pub const FIRST_STORED: Level = Level(2);
+
+    /// The hierarchy over a grid. Every node is looked at once for every stored level, by rayon's current thread pool.
     pub fn build(grid: CurvilinearGrid) -> QuadTree {
-        let levels = grid.layout().levels().skip(1).map(|level| build_level(&grid, level)).collect();
+        let stored = grid.layout().levels().skip(QuadTree::FIRST_STORED.0.into());
+        let levels = stored.map(|level| build_level(&grid, level)).collect();
         QuadTree { grid, levels }
     }
 
@@ -45,18 +50,19 @@ impl QuadTree {
         self.grid.layout()
     }
 
-    /// The array of a level above 0, in the order of [`QuadLayout::address`]; empty for level 0.
+    /// The array of a stored level, in the order of [`QuadLayout::address`]; empty for the levels below.
     pub fn summaries(&self, level: Level) -> &[ZoneSummary] {
-        usize::from(level.0).checked_sub(1).map_or(&[], |i| &self.levels[i])
+        level.0.checked_sub(QuadTree::FIRST_STORED.0).map_or(&[], |i| &self.levels[usize::from(i)])
     }
 
-    /// The summary of a zone; of a final one, made from its corners.
+    /// The summary of a zone.
     #[inline]
     pub fn summary(&self, zone: Zone) -> ZoneSummary {
-        if zone.level == Level(0) {
-            return ZoneSummary::of_final(&self.grid, &self.layout().descendants(zone));
+        if zone.level >= QuadTree::FIRST_STORED {
+            return self.summaries(zone.level)[self.layout().address(zone)];
         }
-        self.summaries(zone.level)[self.layout().address(zone)]
+        let range = self.layout().descendants(zone);
+        if zone.level == Level(0) { ZoneSummary::of_final(&self.grid, &range) } else { examine(&self.grid, &range).0 }
     }
 
     /// A closed box around all nodes of a zone that are no holes.

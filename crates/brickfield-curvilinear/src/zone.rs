@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::chart::{Chart, DrawnZone, Quad, along_edge};
 use crate::{CurvilinearGrid, Node, Positions, ZoneRange};
 
-/// What the hierarchy knows of a zone: 24 bytes, stored for every zone above level 0 (Wynn et al. 1999, section 3).
+/// What the hierarchy knows of a zone: 24 bytes, stored for every zone of the coarser levels (Wynn et al. 1999, section 3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ZoneSummary {
     /// How far nodes lie beyond the box around the zone's four corners, along each axis, in world units; rounded up.

@@ -4,5 +4,6 @@ mod frame_rate;
 mod grids;
 mod layout;
 mod mesh;
+mod octree;
 mod select;
 mod tree;

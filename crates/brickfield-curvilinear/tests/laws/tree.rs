@@ -181,10 +181,12 @@ fn niceness_of_the_generated_grids() {
 fn bytes_of_the_hierarchy() {
     let tree = QuadTree::build(Kind::Flat.grid(64, 64));
     let account = tree.byte_account();
-    // 1/4 + 1/16 + ... of the final zones, 24 bytes each; positions in f64 and values take 28 bytes a node.
-    assert_eq!((account.n_stored_zones, account.bytes_per_zone), (1024 + 256 + 64 + 16 + 4 + 1, 24));
+    // 1/16 + 1/64 + ... of the final zones, 24 bytes each; positions in f64 and values take 28 bytes a node.
+    assert_eq!((account.n_stored_zones, account.bytes_per_zone), (256 + 64 + 16 + 4 + 1, 24));
     assert_eq!(account.data_bytes, 65 * 65 * 28);
-    assert!((account.ratio() - 0.277).abs() < 1e-3, "{}", account.ratio());
+    assert!((account.ratio() - 0.0692).abs() < 1e-4, "{}", account.ratio());
+    let n_stored = |level| tree.summaries(Level(level)).len();
+    assert_eq!([0, 1, 2, 6].map(n_stored), [0, 0, 256, 1]);
 }
 
 #[test]
