@@ -19,6 +19,8 @@ mod octree;
 mod select;
 mod tree;
 mod view;
+mod volume;
+mod walk;
 mod zone;
 
 pub use axis::SplitAxis;
@@ -31,4 +33,6 @@ pub use octree::{CellBox, OctLayout, OctLayoutError, OctZone};
 pub use select::{BudgetSelector, GranularityError, Label, Selection, SelectionError, SelectionWork, SizeSelector};
 pub use tree::{ByteAccount, QuadTree};
 pub use view::{View, ViewError};
+pub use volume::{CurvilinearVolume, CurvilinearVolumeError};
+pub use walk::{CellSegment, CellWalk, CellWalker, CellWalkerError, RayError};
 pub use zone::{Niceness, ZoneSummary, examine};

@@ -67,8 +67,13 @@ impl QuadTree {
 
     /// A closed box around all nodes of a zone that are no holes.
     pub fn extent(&self, zone: Zone) -> Aabb {
+        self.extent_by(zone, &self.summary(zone))
+    }
+
+    /// The same, of a zone whose summary is known.
+    pub(crate) fn extent_by(&self, zone: Zone, summary: &ZoneSummary) -> Aabb {
         let around = Aabb::of_points(Quad::of(&self.grid, &self.layout().descendants(zone)).positions);
-        let extension = self.summary(zone).extension.as_dvec3();
+        let extension = summary.extension.as_dvec3();
         Aabb { min: around.min - extension, max: around.max + extension }
     }
 

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::{Label, Selection, SelectionWork, ZoneMap};
-use crate::{QuadTree, View, Zone};
+use crate::{QuadTree, View, Zone, ZoneSummary};
 use brickfield_core::Level;
 
 /// Divides the zone with the greatest error again and again, until the next division would exceed a number of zones.
@@ -144,7 +144,7 @@ impl BudgetSelector {
     /// Labels a zone that has no label.
     fn place(&mut self, zone: Zone, error_above: f32, view: &View) {
         let summary = self.tree.summary(zone);
-        let (is_visible, slack) = self.visibility(zone, view);
+        let (is_visible, slack) = self.visibility(zone, &summary, view);
         let expiry = self.odometer + slack;
         if !is_visible {
             self.selection.set(zone, Label::Out, expiry);
@@ -203,7 +203,7 @@ impl BudgetSelector {
         self.work.n_merged += 1;
         self.remove_below(zone);
         self.forget_division(zone);
-        let (_, slack) = self.visibility(zone, view);
+        let (_, slack) = self.visibility(zone, &self.tree.summary(zone), view);
         self.selection.set(zone, Label::Leaf, self.odometer + slack);
         self.propose(zone, self.ranks[&zone].error);
     }
@@ -231,7 +231,7 @@ impl BudgetSelector {
             self.selection.remove(zone);
             return self.place(zone, error_above, view);
         }
-        let (is_visible, slack) = self.visibility(zone, view);
+        let (is_visible, slack) = self.visibility(zone, &self.tree.summary(zone), view);
         let expiry = self.odometer + slack;
         if !is_visible {
             self.remove_below(zone);
@@ -276,12 +276,12 @@ impl BudgetSelector {
         self.n_zones -= self.divided.remove(&turn).unwrap_or(0);
     }
 
-    fn visibility(&mut self, zone: Zone, view: &View) -> (bool, f64) {
+    fn visibility(&mut self, zone: Zone, summary: &ZoneSummary, view: &View) -> (bool, f64) {
         self.work.n_visited += 1;
-        if self.tree.summary(zone).is_void() {
+        if summary.is_void() {
             return (false, f64::INFINITY);
         }
-        let seen = view.seen(&self.tree.extent(zone));
+        let seen = view.seen(&self.tree.extent_by(zone, summary));
         (seen.is_visible, seen.slack)
     }
 }

@@ -103,7 +103,7 @@ fn decide(tree: &QuadTree, view: &View, granularity: f64, zone: Zone) -> (Label,
     if summary.is_void() {
         return (Label::Out, f64::INFINITY);
     }
-    let extent = tree.extent(zone);
+    let extent = tree.extent_by(zone, &summary);
     let seen = view.seen(&extent);
     if !seen.is_visible {
         return (Label::Out, seen.slack);

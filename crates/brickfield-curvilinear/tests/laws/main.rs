@@ -7,3 +7,4 @@ mod mesh;
 mod octree;
 mod select;
 mod tree;
+mod walk;
