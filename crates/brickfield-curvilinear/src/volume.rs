@@ -132,6 +132,10 @@ impl CellMap {
                 break;
             };
             (local, distance) = (next, next_distance);
+            // The next step would be about the square of this one.
+            if step.length_squared() < 1e-17 {
+                break;
+            }
         }
         local
     }

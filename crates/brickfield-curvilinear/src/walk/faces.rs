@@ -3,7 +3,7 @@
 use brickfield_core::Ray;
 use brickfield_core::glam::{DVec3, UVec3};
 
-use super::lattice::{Corner, Line};
+use super::lattice::{Corner, Line, Side};
 use crate::CurvilinearVolume;
 
 /// One of the six faces of a cell: 2 * axis for the lower one along an axis, and 2 * axis + 1 for the upper one.
@@ -45,30 +45,55 @@ impl Cell {
 
     /// Where the line crosses a triangle.
     pub(crate) fn crossing(&self, line: &Line, half: Half) -> Option<Crossing> {
-        let [a, b, c] = triangle(half);
-        let [of_c, of_a, of_b] = [(a, b), (b, c), (c, a)].map(|(from, to)| self.side(line, from, to));
-        if of_c.0 == 0 || of_c.0 != of_a.0 || of_c.0 != of_b.0 {
-            return None;
-        }
-        // The determinants are the weights of the corners: between 0 and 1 of their sum, which is not 0 where the signs agree.
-        let sum = of_a.1 + of_b.1 + of_c.1;
-        let t = (of_a.1 * self.t[a] + of_b.1 * self.t[b] + of_c.1 * self.t[c]) / sum;
-        Some(Crossing { half, t, leaves: of_c.0 > 0 })
+        self.crossing_by(&mut Sides::default(), line, half)
     }
 
-    /// All crossings of one kind, along the ray.
-    pub(crate) fn crossings(&self, line: &Line, leaving: bool) -> Vec<Crossing> {
-        let halves = (0..6).flat_map(|face| [0, 1].map(|part| Half { face, part }));
-        let mut crossings: Vec<Crossing> =
-            halves.filter_map(|half| self.crossing(line, half)).filter(|c| c.leaves == leaving).collect();
-        crossings.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.half.cmp(&b.half)));
+    /// Where the line enters a cell of a right-handed grid, and where it leaves it, each along the ray.
+    pub(crate) fn crossings(&self, line: &Line) -> [Vec<Crossing>; 2] {
+        let mut sides = Sides::default();
+        let mut crossings = [Vec::new(), Vec::new()];
+        for half in (0..6).flat_map(|face| [0, 1].map(|part| Half { face, part })) {
+            if let Some(crossing) = self.crossing_by(&mut sides, line, half) {
+                crossings[usize::from(crossing.leaves)].push(crossing);
+            }
+        }
+        for of_kind in &mut crossings {
+            of_kind.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.half.cmp(&b.half)));
+        }
         crossings
     }
 
-    /// The sign and determinant of an edge. Both cells at an edge ask in the same order of its ends: that of their nodes.
-    fn side(&self, line: &Line, from: usize, to: usize) -> (i8, f64) {
-        let side = line.side(self.corners[from.min(to)], self.corners[from.max(to)]);
-        if from < to { (side.sign, side.determinant) } else { (-side.sign, -side.determinant) }
+    fn crossing_by(&self, sides: &mut Sides, line: &Line, half: Half) -> Option<Crossing> {
+        let [a, b, c] = triangle(half);
+        let of_c = self.side(sides, line, a, b);
+        let of_a = self.side(sides, line, b, c);
+        if of_c.sign == 0 || of_c.sign != of_a.sign {
+            return None;
+        }
+        let of_b = self.side(sides, line, c, a);
+        if of_c.sign != of_b.sign {
+            return None;
+        }
+        // The determinants are the weights of the corners: between 0 and 1 of their sum, which is not 0 where the signs agree.
+        let [wa, wb, wc] = [of_a, of_b, of_c].map(|side| side.determinant);
+        let t = (wa * self.t[a] + wb * self.t[b] + wc * self.t[c]) / (wa + wb + wc);
+        Some(Crossing { half, t, leaves: of_c.sign > 0 })
+    }
+
+    /// The side of an edge. Both cells at an edge ask in the same order of its ends: that of their nodes.
+    fn side(&self, sides: &mut Sides, line: &Line, from: usize, to: usize) -> Side {
+        let (low, high) = (from.min(to), from.max(to));
+        let side = *sides.0[8 * low + high].get_or_insert_with(|| line.side(self.corners[low], self.corners[high]));
+        if from < to { side } else { Side { sign: -side.sign, determinant: -side.determinant } }
+    }
+}
+
+/// The edges of a cell, and diagonals of its faces, that were looked at: by eight times the lower corner, and the upper one.
+struct Sides([Option<Side>; 64]);
+
+impl Default for Sides {
+    fn default() -> Sides {
+        Sides([None; 64])
     }
 }
 

@@ -119,9 +119,12 @@ impl CellWalker {
     /// the first exit belongs to the first entry, the second to the second.
     fn exit(&self, ray: &Ray, line: &Line, entry: &Entry) -> Option<Entry> {
         let cell = Cell::of(&self.volume, entry.cell, line, ray);
-        let entered = cell.crossings(line, !self.is_right_handed);
+        let [mut entered, mut left] = cell.crossings(line);
+        if !self.is_right_handed {
+            std::mem::swap(&mut entered, &mut left);
+        }
         let turn = entered.iter().position(|crossing| crossing.half == entry.half)?;
-        let left = cell.crossings(line, self.is_right_handed).get(turn).copied()?;
+        let left = left.get(turn)?;
         Some(Entry { cell: entry.cell, half: left.half, t: left.t })
     }
 }
