@@ -128,8 +128,8 @@ fn select(tree: &Arc<QuadTree>) {
         last = by_size.update(&flight(tree, step));
     });
     report("  20 m further", &times, last, by_size.selection());
-    let mesh = turns(5, || surrogate_mesh(tree.grid(), by_size.selection()));
-    println!("    mesh of {} triangles in {mesh}", surrogate_mesh(tree.grid(), by_size.selection()).triangles.len());
+    let time = turns(5, || mesh(tree, by_size.selection()));
+    println!("    mesh of {} triangles in {time}", mesh(tree, by_size.selection()).triangles.len());
 
     let fresh = |step| {
         let mut by_error = BudgetSelector::new(tree.clone());
@@ -192,18 +192,22 @@ fn compare(what: &str, tree: &Arc<QuadTree>) {
 fn greedy(tree: &Arc<QuadTree>, view: &View, budget: usize, percent: impl Fn(f32) -> f32) -> String {
     let mut selector = BudgetSelector::new(tree.clone());
     selector.update(view, budget);
-    let mesh = surrogate_mesh(tree.grid(), selector.selection());
+    let drawn = mesh(tree, selector.selection());
     let [of_zones, of_mesh] = errors(tree, selector.selection());
-    let values = mesh.nodes.iter().map(|node| tree.grid().value(*node)).collect();
-    let of_stitched = deviation(tree.grid(), &SurrogateMesh { values, ..mesh.clone() });
+    let values = drawn.nodes.iter().map(|node| tree.grid().value(*node)).collect();
+    let of_stitched = deviation(tree.grid(), &SurrogateMesh { values, ..drawn.clone() });
     let [of_zones, of_mesh, of_stitched] = [of_zones, of_mesh, of_stitched].map(percent);
-    format!("{} | {of_zones:.2} | {of_mesh:.2} | {of_stitched:.2} |", mesh.triangles.len())
+    format!("{} | {of_zones:.2} | {of_mesh:.2} | {of_stitched:.2} |", drawn.triangles.len())
 }
 
 /// The greatest error that zones say, and the greatest deviation of a node from the drawn mesh, patches included.
 fn errors(tree: &QuadTree, selection: &Selection) -> [f32; 2] {
-    let mesh = surrogate_mesh(tree.grid(), selection);
-    [selection.greatest_error(tree), deviation(tree.grid(), &mesh)]
+    let drawn = mesh(tree, selection);
+    [selection.greatest_error(tree), deviation(tree.grid(), &drawn)]
+}
+
+fn mesh(tree: &QuadTree, selection: &Selection) -> SurrogateMesh {
+    surrogate_mesh(tree.grid(), selection).expect("a selection of the tree")
 }
 
 /// Looks at every node below every triangle of a height field's mesh.

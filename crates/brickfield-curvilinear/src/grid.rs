@@ -137,10 +137,14 @@ impl CurvilinearGrid {
         Ok(CurvilinearGrid { ends, ..self })
     }
 
-    /// The same grid with holes where `is_hole` says so, by the number of a node in the order of rows (IBLANK = 0 in PLOT3D).
+    /// The same grid with holes where `is_hole` says so, by the number of a node in the order of rows (IBLANK = 0 in PLOT3D). A node of
+    /// a seam is a hole if one of its copies is.
     pub fn with_holes(mut self, is_hole: impl Fn(usize) -> bool) -> CurvilinearGrid {
-        for (_, value) in self.values.iter_mut().enumerate().filter(|(i, _)| is_hole(*i)) {
-            *value = f32::NAN;
+        for i in 0..self.values.len() {
+            let copies = self.copies(self.canonical(self.node(i)));
+            if copies.map(|node| self.number(node)).any(&is_hole) {
+                self.values[i] = f32::NAN;
+            }
         }
         self
     }
@@ -186,6 +190,9 @@ impl CurvilinearGrid {
     }
 
     /// The value of a node; NaN for a hole.
+    ///
+    /// # Panics
+    /// Beyond the last row, as [`position`](Self::position) does.
     #[inline]
     pub fn value(&self, node: Node) -> f32 {
         self.values[self.number(node)]

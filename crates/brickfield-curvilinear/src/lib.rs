@@ -28,7 +28,7 @@ pub use check::{MeshFault, check_mesh};
 pub use frame_rate::{FeedbackBudget, FrameTarget, FrameTime, FrameTimeError, PredictiveBudget};
 pub use grid::{CurvilinearGrid, CurvilinearGridError, End, GridEnds, HeightField, Node, Positions, hgt_value};
 pub use layout::{LayoutError, QuadLayout, Zone, ZoneRange};
-pub use mesh::{SurrogateMesh, surrogate_mesh};
+pub use mesh::{OtherGrid, SurrogateMesh, surrogate_mesh};
 pub use octree::{CellBox, OctLayout, OctLayoutError, OctZone};
 pub use select::{BudgetSelector, GranularityError, Label, Selection, SelectionError, SelectionWork, SizeSelector};
 pub use tree::{ByteAccount, QuadTree};

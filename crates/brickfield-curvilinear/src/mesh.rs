@@ -27,6 +27,18 @@ pub struct SurrogateMesh {
     pub n_moved: usize,
 }
 
+/// A selection of another grid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "a selection of {} x {} zones; the grid has {} x {}",
+    of_selection[0], of_selection[1], of_grid[0], of_grid[1]
+)]
+#[allow(missing_docs)]
+pub struct OtherGrid {
+    pub of_grid: [u32; 2],
+    pub of_selection: [u32; 2],
+}
+
 /// The passes that keep a mesh free of cracks. Tests leave one out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Passes {
@@ -63,11 +75,15 @@ impl SurrogateMesh {
 ///  +-------+---+
 /// ```
 ///
-/// # Panics
-/// If the selection is one of a grid with other numbers of rows or columns.
-pub fn surrogate_mesh(grid: &CurvilinearGrid, selection: &Selection) -> SurrogateMesh {
-    assert_eq!(grid.layout(), selection.layout(), "a selection of another grid");
-    mesh_by(grid, selection, Passes::Both)
+/// # Errors
+/// A selection of a grid with other numbers of rows or columns.
+pub fn surrogate_mesh(grid: &CurvilinearGrid, selection: &Selection) -> Result<SurrogateMesh, OtherGrid> {
+    let [of_grid, of_selection] =
+        [grid.layout(), selection.layout()].map(|layout| [layout.rows().n_final(), layout.columns().n_final()]);
+    if of_grid != of_selection {
+        return Err(OtherGrid { of_grid, of_selection });
+    }
+    Ok(mesh_by(grid, selection, Passes::Both))
 }
 
 pub(crate) fn mesh_by(grid: &CurvilinearGrid, selection: &Selection, passes: Passes) -> SurrogateMesh {
@@ -208,9 +224,6 @@ fn hanging_on(
     cell: (i64, i64),
 ) -> Option<Hanging> {
     let cell = grid.moved(node, cell.0, cell.1)?;
-    if cell.row == grid.n_rows() || cell.column == grid.n_columns() {
-        return None;
-    }
     let leaf = selection.leaf_over(cell.row, cell.column).filter(|leaf| leaf.level > Level(0))?;
     let corners = corners(&grid.layout().descendants(leaf));
     (0..4).find_map(|edge| {

@@ -56,6 +56,9 @@ impl QuadTree {
     }
 
     /// The summary of a zone.
+    ///
+    /// # Panics
+    /// If the layout does not contain the zone, as [`extent`](Self::extent) does.
     #[inline]
     pub fn summary(&self, zone: Zone) -> ZoneSummary {
         if zone.level >= QuadTree::FIRST_STORED {

@@ -64,7 +64,10 @@ impl ZoneSummary {
 
 /// Looks at every node of a zone: its summary, and whether it may be drawn coarse.
 ///
-/// `range` is that of a zone above level 0. A zone of many nodes is looked at by several threads, with the same result.
+/// `range` is that of a zone above level 0, or any other range of final zones of the grid. A zone of many nodes is looked at by several threads, with the same result.
+///
+/// # Panics
+/// If the range is empty or leads out of the grid.
 pub fn examine(grid: &CurvilinearGrid, range: &ZoneRange) -> (ZoneSummary, Niceness) {
     let quad = Quad::of(grid, range);
     let drawn = drawn_zone(grid, &quad);

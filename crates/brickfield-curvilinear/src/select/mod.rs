@@ -102,8 +102,11 @@ impl Selection {
         leaves
     }
 
-    /// The zone that draws a final zone.
+    /// The zone that draws a final zone; `None` if it is out, or not in the grid.
     pub fn leaf_over(&self, row: u32, column: u32) -> Option<Zone> {
+        if row >= self.layout.rows().n_final() || column >= self.layout.columns().n_final() {
+            return None;
+        }
         // Of all zones over a final zone, the finest one with a label is no branch.
         for level in self.layout.levels() {
             let zone = self.layout.ancestor(level, row, column);

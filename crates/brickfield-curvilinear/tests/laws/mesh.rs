@@ -27,12 +27,9 @@ proptest! {
     fn no_mesh_has_cracks(
         kind in kinds(), m in 3u32..40, n in 3u32..40, seed in 0u64..u64::MAX, holes in 0usize..3,
     ) {
-        let grid = kind.grid(m, n).with_holes(|i| holes > 0 && i % 97 == 31);
-        // Copies of a node are holes together, or the seam is none.
-        let Ok(grid) = grid.with_ends(kind.ends()) else { return Ok(()) };
-        let tree = QuadTree::build(grid);
+        let tree = QuadTree::build(kind.grid(m, n).with_holes(|i| holes > 0 && i % 97 == 31));
         let selection = Selection::of_leaves(&tree, random_leaves(&tree, seed)).unwrap();
-        let mesh = surrogate_mesh(tree.grid(), &selection);
+        let mesh = surrogate_mesh(tree.grid(), &selection).unwrap();
         prop_assert_eq!(check_mesh(tree.grid(), &selection, &mesh), Ok(()));
         prop_assert!(mesh.values.iter().all(|value| !value.is_nan()), "a hole is drawn");
         prop_assert_eq!(mesh.triangles.len(), 2 * selection.n_leaves() + mesh.n_moved);
@@ -70,7 +67,7 @@ proptest! {
 fn patched(kind: Kind, m: u32, n: u32, seed: u64) -> (QuadTree, SurrogateMesh, f32) {
     let tree = QuadTree::build(kind.grid(m, n));
     let selection = Selection::of_leaves(&tree, random_leaves(&tree, seed)).unwrap();
-    let mesh = surrogate_mesh(tree.grid(), &selection);
+    let mesh = surrogate_mesh(tree.grid(), &selection).unwrap();
     let mut errors = vec![0.0f32; usize::from(tree.layout().top().0) + 1];
     for leaf in selection.leaves() {
         let error = &mut errors[usize::from(leaf.level.0)];
@@ -108,7 +105,7 @@ fn a_mesh_of_selected_zones_is_sound() {
         by_size.update(&view);
         by_error.update(&view, 1_500);
         for selection in [by_size.selection(), by_error.selection()] {
-            let mesh = surrogate_mesh(tree.grid(), selection);
+            let mesh = surrogate_mesh(tree.grid(), selection).unwrap();
             assert_eq!(check_mesh(tree.grid(), selection, &mesh), Ok(()), "{kind:?}");
             assert!(mesh.n_moved > 0, "{kind:?} has zones of one level only");
         }
@@ -124,7 +121,7 @@ fn a_coarse_zone_beside_fine_ones() {
     let left = Zone { level: Level(1), row: 0, column: 0 };
     let right = [(0, 2), (0, 3), (1, 2), (1, 3)].map(|(row, column)| Zone { level: Level(0), row, column });
     let selection = Selection::of_leaves(&tree, right.into_iter().chain([left])).unwrap();
-    let mesh = surrogate_mesh(tree.grid(), &selection);
+    let mesh = surrogate_mesh(tree.grid(), &selection).unwrap();
     // The coarse zone has three triangles; the vertex on its edge is drawn where the edge is, at value 0.
     assert_eq!((mesh.triangles.len(), mesh.n_moved), (4 * 2 + 3, 1));
     let moved = mesh.nodes.iter().position(|node| *node == Node { row: 1, column: 2 }).unwrap();
@@ -139,7 +136,23 @@ fn only_the_drawn_zones_meet_at_a_border() {
     let tree = QuadTree::build(Kind::Waves.grid(2, 4));
     let left = Zone { level: Level(1), row: 0, column: 0 };
     let selection = Selection::of_leaves(&tree, [left]).unwrap();
-    let mesh = surrogate_mesh(tree.grid(), &selection);
+    let mesh = surrogate_mesh(tree.grid(), &selection).unwrap();
     assert_eq!((mesh.triangles.len(), mesh.n_moved), (2, 0));
     assert_eq!(check_mesh(tree.grid(), &selection, &mesh), Ok(()));
+}
+
+#[test]
+fn a_selection_of_another_grid_is_named() {
+    let [tree, other] = [4, 5].map(|n| QuadTree::build(Kind::Flat.grid(4, n)));
+    let selection = Selection::of_leaves(&other, [other.layout().root()]).unwrap();
+    let error = surrogate_mesh(tree.grid(), &selection).unwrap_err().to_string();
+    assert_eq!(error, "a selection of 4 x 5 zones; the grid has 4 x 4");
+}
+
+#[test]
+fn holes_on_a_seam_are_holes_on_both_sides() {
+    let grid = Kind::Torus.grid(5, 7).with_holes(|i| i == 3);
+    let is_hole = |row, column| grid.value(Node { row, column }).is_nan();
+    assert!(is_hole(0, 3) && is_hole(5, 3) && !is_hole(1, 3));
+    assert_eq!(grid.clone().with_ends(grid.ends()).map(|grid| grid.ends()), Ok(Kind::Torus.ends()));
 }
