@@ -13,6 +13,7 @@ use brickfield_curvilinear::{
     BudgetSelector, CurvilinearGrid, HeightField, Positions, QuadTree, Selection, SelectionWork, SizeSelector,
     SurrogateMesh, View, hgt_value, surrogate_mesh,
 };
+use rayon::prelude::*;
 
 fn main() {
     let sizes: Vec<u32> = std::env::args().skip(1).filter_map(|argument| argument.parse().ok()).collect();
@@ -41,7 +42,8 @@ fn terrain(n: u32) -> CurvilinearGrid {
         let rough = 0.5 + 0.5 * (3.0 * x + 1.0).sin() * (2.0 * y).cos();
         (600.0 * (octave(0) + rough * (1..9).map(octave).sum::<f64>())) as f32
     };
-    let values = (0..=n).flat_map(|row| (0..=n).map(move |column| height(row, column))).collect();
+    let rows = (0..=n).into_par_iter();
+    let values = rows.flat_map_iter(|row| (0..=n).map(move |column| height(row, column))).collect();
     let field = HeightField {
         origin: DVec3::ZERO,
         along_column: DVec3::X * 30.0,
