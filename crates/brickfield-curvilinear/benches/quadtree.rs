@@ -130,8 +130,7 @@ fn select(tree: &Arc<QuadTree>) {
         last = by_size.update(&flight(tree, step));
     });
     report("  20 m further", &times, last, by_size.selection());
-    let time = turns(5, || mesh(tree, by_size.selection()));
-    println!("    mesh of {} triangles in {time}", mesh(tree, by_size.selection()).triangles.len());
+    report_mesh(tree, by_size.selection());
 
     let fresh = |step| {
         let mut by_error = BudgetSelector::new(tree.clone());
@@ -146,6 +145,12 @@ fn select(tree: &Arc<QuadTree>) {
         last = by_error.update(&flight(tree, step), 50_000);
     });
     report("  20 m further", &times, last, by_error.selection());
+    report_mesh(tree, by_error.selection());
+}
+
+fn report_mesh(tree: &QuadTree, selection: &Selection) {
+    let time = turns(7, || mesh(tree, selection));
+    println!("    mesh of {} triangles in {time}", mesh(tree, selection).triangles.len());
 }
 
 fn report(what: &str, times: &str, work: SelectionWork, selection: &Selection) {

@@ -102,8 +102,9 @@ pub(crate) fn mesh_by(grid: &CurvilinearGrid, selection: &Selection, passes: Pas
     if constrains {
         hanging.iter().for_each(|vertex| vertices.constrain(grid, vertex));
     }
-    let on_edges = if stitches { by_edge(&hanging) } else { ZoneMap::default() };
-    let triangles = leaves.par_iter().flat_map_iter(|leaf| vertices.stitch(grid, *leaf, &on_edges)).collect();
+    let taken_up = if stitches { &hanging[..] } else { &[] };
+    let of_leaf = |(leaf, corners): (&Zone, &[u32; 4])| stitched(grid, *leaf, *corners, on_edges_of(*leaf, taken_up));
+    let triangles = leaves.par_iter().zip(&vertices.of_leaf).flat_map_iter(of_leaf).collect();
     let Vertices { positions, values, nodes, .. } = vertices;
     SurrogateMesh { positions, values, nodes, triangles, n_moved: hanging.len() }
 }
@@ -119,11 +120,16 @@ struct Hanging {
     node: Node,
 }
 
-/// Vertices within the edge of a leaf, by leaf and edge, in order along the edge.
-type OnEdges = ZoneMap<(Zone, usize), Vec<u32>>;
+impl Hanging {
+    /// How many nodes lie between the first end of the edge and the vertex.
+    fn along(&self) -> u32 {
+        self.node.row.abs_diff(self.ends[0].row) + self.node.column.abs_diff(self.ends[0].column)
+    }
+}
 
 /// The corners of all leaves.
 struct Vertices {
+    of_leaf: Vec<[u32; 4]>,
     positions: Vec<DVec3>,
     values: Vec<f32>,
     nodes: Vec<Node>,
@@ -132,27 +138,30 @@ struct Vertices {
 
 impl Vertices {
     fn of(grid: &CurvilinearGrid, leaves: &[Zone]) -> Vertices {
-        let mut vertices =
-            Vertices { positions: Vec::new(), values: Vec::new(), nodes: Vec::new(), of_node: ZoneMap::default() };
+        let mut vertices = Vertices {
+            of_leaf: Vec::with_capacity(leaves.len()),
+            positions: Vec::new(),
+            values: Vec::new(),
+            nodes: Vec::new(),
+            of_node: ZoneMap::default(),
+        };
         for leaf in leaves {
-            for node in corners(&grid.layout().descendants(*leaf)) {
-                vertices.add(grid, grid.canonical(node));
-            }
+            let corners = corners(&grid.layout().descendants(*leaf));
+            let of_leaf = corners.map(|node| vertices.add(grid, grid.canonical(node)));
+            vertices.of_leaf.push(of_leaf);
         }
         vertices
     }
 
-    fn add(&mut self, grid: &CurvilinearGrid, node: Node) {
+    fn add(&mut self, grid: &CurvilinearGrid, node: Node) -> u32 {
         let next = self.nodes.len() as u32;
-        if *self.of_node.entry(node).or_insert(next) == next {
+        let vertex = *self.of_node.entry(node).or_insert(next);
+        if vertex == next {
             self.positions.push(grid.position(node));
             self.values.push(grid.value(node));
             self.nodes.push(node);
         }
-    }
-
-    fn vertex(&self, grid: &CurvilinearGrid, node: Node) -> u32 {
-        self.of_node[&grid.canonical(node)]
+        vertex
     }
 
     /// Moves a vertex onto the edge, as that is drawn. Its place along the edge is the one before any vertex was moved, which is in order
@@ -160,28 +169,33 @@ impl Vertices {
     fn constrain(&mut self, grid: &CurvilinearGrid, hanging: &Hanging) {
         // An edge without length has all its vertices at its first end.
         let t = along_edge(grid, hanging.ends, hanging.node).unwrap_or(0.0);
-        let [a, b] = hanging.ends.map(|node| self.vertex(grid, node) as usize);
+        let [a, b] = hanging.ends.map(|node| self.of_node[&grid.canonical(node)] as usize);
         let i = hanging.vertex as usize;
         self.positions[i] = self.positions[a] + (self.positions[b] - self.positions[a]) * t;
         self.values[i] = lerp(f64::from(self.values[a]), f64::from(self.values[b]), t) as f32;
     }
+}
 
-    /// The triangles of a leaf, those on the right of its diagonal first.
-    fn stitch(&self, grid: &CurvilinearGrid, leaf: Zone, on_edges: &OnEdges) -> Vec<[u32; 3]> {
-        let quad = Quad::of(grid, &grid.layout().descendants(leaf));
-        let first = quad.cut(grid);
-        // The vertices of an edge, both ends included.
-        let edge = |i: usize| {
-            let i = (first + i) % 4;
-            let ends = [quad.nodes[i], quad.nodes[(i + 1) % 4]].map(|node| self.vertex(grid, node));
-            let within = on_edges.get(&(leaf, i)).into_iter().flatten().copied();
-            std::iter::once(ends[0]).chain(within).chain([ends[1]]).collect::<Vec<u32>>()
-        };
-        let mut triangles = Vec::new();
-        zip(&edge(0), &edge(1), &mut triangles);
-        zip(&edge(2), &edge(3), &mut triangles);
-        triangles
-    }
+/// The vertices on the edges of a leaf, edge by edge, each from its first end to its second.
+fn on_edges_of(leaf: Zone, hanging: &[Hanging]) -> &[Hanging] {
+    let of_coarser = hanging.partition_point(|h| h.leaf > leaf);
+    let n = hanging[of_coarser..].partition_point(|h| h.leaf == leaf);
+    &hanging[of_coarser..of_coarser + n]
+}
+
+/// The triangles of a leaf, those on the right of its diagonal first.
+fn stitched(grid: &CurvilinearGrid, leaf: Zone, corners: [u32; 4], on_edges: &[Hanging]) -> Vec<[u32; 3]> {
+    let first = Quad::of(grid, &grid.layout().descendants(leaf)).cut(grid);
+    // The vertices of an edge, both ends included.
+    let edge = |i: usize| {
+        let i = (first + i) % 4;
+        let within = on_edges.iter().filter(|h| h.edge == i).map(|h| h.vertex);
+        std::iter::once(corners[i]).chain(within).chain([corners[(i + 1) % 4]]).collect::<Vec<u32>>()
+    };
+    let mut triangles = Vec::with_capacity(2 + on_edges.len());
+    zip(&edge(0), &edge(1), &mut triangles);
+    zip(&edge(2), &edge(3), &mut triangles);
+    triangles
 }
 
 /// The triangles between two chains of vertices, the second of which goes on where the first ends: a triangle whose sides the chains are, cut
@@ -203,14 +217,14 @@ fn zip(to_apex: &[u32], from_apex: &[u32], triangles: &mut Vec<[u32; 3]>) {
     }
 }
 
-/// The vertices that lie within an edge of a leaf, those of coarse leaves first.
+/// The vertices that lie within an edge of a leaf: by leaves, the coarse ones first, then by edges, each from its first end on.
 fn hanging_vertices(grid: &CurvilinearGrid, selection: &Selection, vertices: &Vertices) -> Vec<Hanging> {
     let of = |(vertex, node): (usize, &Node)| {
         let cells = [(-1, -1), (-1, 0), (0, -1), (0, 0)];
         cells.into_iter().find_map(|cell| hanging_on(grid, selection, vertex as u32, *node, cell))
     };
     let mut hanging: Vec<Hanging> = vertices.nodes.par_iter().enumerate().filter_map(of).collect();
-    hanging.sort_by_key(|h| (std::cmp::Reverse(h.leaf), h.edge, h.node.row, h.node.column));
+    hanging.par_sort_unstable_by_key(|h| (std::cmp::Reverse(h.leaf), h.edge, h.along()));
     hanging
 }
 
@@ -240,15 +254,4 @@ fn within(grid: &CurvilinearGrid, [a, b]: [Node; 2], node: Node) -> Option<Node>
         (a.row == b.row && n.row == a.row && is_between(n.column, a.column, b.column))
             || (a.column == b.column && n.column == a.column && is_between(n.row, a.row, b.row))
     })
-}
-
-/// From the first end of each edge to the second.
-fn by_edge(hanging: &[Hanging]) -> OnEdges {
-    let mut on_edges = OnEdges::default();
-    let mut sorted: Vec<&Hanging> = hanging.iter().collect();
-    sorted.sort_by_key(|h| h.node.row.abs_diff(h.ends[0].row) + h.node.column.abs_diff(h.ends[0].column));
-    for h in sorted {
-        on_edges.entry((h.leaf, h.edge)).or_default().push(h.vertex);
-    }
-    on_edges
 }
