@@ -3,7 +3,7 @@
 use brickfield_core::Ray;
 use brickfield_core::glam::{DVec3, UVec3};
 
-use super::lattice::{Corner, Line, Side};
+use super::lattice::{Corner, Line};
 use crate::CurvilinearVolume;
 
 /// One of the six faces of a cell: 2 * axis for the lower one along an axis, and 2 * axis + 1 for the upper one.
@@ -30,16 +30,18 @@ pub(crate) struct Crossing {
 /// The corners of a cell, as the lattice has them and along the ray.
 pub(crate) struct Cell {
     corners: [Corner; 8],
-    t: [f64; 8],
+    /// Relative to the ray's origin.
+    positions: [DVec3; 8],
+    direction: DVec3,
 }
 
 impl Cell {
     pub(crate) fn of(volume: &CurvilinearVolume, cell: UVec3, line: &Line, ray: &Ray) -> Cell {
         let positions = volume.corners(cell);
-        let per_length = ray.direction / ray.direction.length_squared();
         Cell {
             corners: positions.map(|p| line.corner(p)),
-            t: positions.map(|p: DVec3| (p - ray.origin).dot(per_length)),
+            positions: positions.map(|p| p - ray.origin),
+            direction: ray.direction,
         }
     }
 
@@ -67,29 +69,34 @@ impl Cell {
         let [a, b, c] = triangle(half);
         let of_c = self.side(sides, line, a, b);
         let of_a = self.side(sides, line, b, c);
-        if of_c.sign == 0 || of_c.sign != of_a.sign {
+        if of_c == 0 || of_c != of_a {
             return None;
         }
-        let of_b = self.side(sides, line, c, a);
-        if of_c.sign != of_b.sign {
-            return None;
-        }
-        // The determinants are the weights of the corners: between 0 and 1 of their sum, which is not 0 where the signs agree.
-        let [wa, wb, wc] = [of_a, of_b, of_c].map(|side| side.determinant);
-        let t = (wa * self.t[a] + wb * self.t[b] + wc * self.t[c]) / (wa + wb + wc);
-        Some(Crossing { half, t, leaves: of_c.sign > 0 })
+        let is_crossed = self.side(sides, line, c, a) == of_c;
+        is_crossed.then(|| Crossing { half, t: self.t([a, b, c]), leaves: of_c > 0 })
+    }
+
+    /// Where the ray meets the plane of a triangle, from positions that are not rounded to the lattice; not before the first of its
+    /// corners along the ray, nor behind the last, where the ray nearly runs in the plane.
+    fn t(&self, corners: [usize; 3]) -> f64 {
+        let [a, b, c] = corners.map(|i| self.positions[i]);
+        let normal = (b - a).cross(c - a);
+        let along = [a, b, c].map(|p| p.dot(self.direction) / self.direction.length_squared());
+        let (first, last) = (along[0].min(along[1]).min(along[2]), along[0].max(along[1]).max(along[2]));
+        let t = a.dot(normal) / self.direction.dot(normal);
+        if t.is_nan() { 0.5 * (first + last) } else { t.max(first).min(last) }
     }
 
     /// The side of an edge. Both cells at an edge ask in the same order of its ends: that of their nodes.
-    fn side(&self, sides: &mut Sides, line: &Line, from: usize, to: usize) -> Side {
+    fn side(&self, sides: &mut Sides, line: &Line, from: usize, to: usize) -> i8 {
         let (low, high) = (from.min(to), from.max(to));
         let side = *sides.0[8 * low + high].get_or_insert_with(|| line.side(self.corners[low], self.corners[high]));
-        if from < to { side } else { Side { sign: -side.sign, determinant: -side.determinant } }
+        if from < to { side } else { -side }
     }
 }
 
 /// The edges of a cell, and diagonals of its faces, that were looked at: by eight times the lower corner, and the upper one.
-struct Sides([Option<Side>; 64]);
+struct Sides([Option<i8>; 64]);
 
 impl Default for Sides {
     fn default() -> Sides {

@@ -25,14 +25,6 @@ pub(crate) struct Line {
 /// A corner relative to the line's foot.
 pub(crate) type Corner = [i64; 3];
 
-/// On which side of the directed edge the line passes, and the determinant that says so.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Side {
-    /// 1, -1, or 0 for an edge that is parallel to the line.
-    pub(crate) sign: i8,
-    pub(crate) determinant: f64,
-}
-
 impl Lattice {
     pub(crate) fn over(extent: &Aabb) -> Lattice {
         let half = 0.5 * extent.extent().max_element();
@@ -72,21 +64,20 @@ impl Line {
     }
 
     /// The side of the edge from `a` to `b`, the sign of d . (a x b): 1 if the edge goes round the line counter-clockwise, seen against
-    /// the line's direction.
+    /// the line's direction; 0 if it is parallel to the line.
     ///
     /// A line that meets the edge is taken for one that is shifted by an infinitely small way along one axis, and by a much smaller one
     /// along another. So all triangles around an edge or a corner agree on a line that meets it: exactly as many are left as are
     /// entered.
-    pub(crate) fn side(&self, a: Corner, b: Corner) -> Side {
+    pub(crate) fn side(&self, a: Corner, b: Corner) -> i8 {
         let by_float = determinant(self.direction.map(|i| i as f64), a.map(|i| i as f64), b.map(|i| i as f64));
         // Factors are at most 2^38, 2^41 and 2^41: six products with three roundings each.
         if by_float.abs() > 2f64.powi(BITS + 2 * (BITS + 3) + 6 - 52) {
-            return Side { sign: if by_float > 0.0 { 1 } else { -1 }, determinant: by_float };
+            return if by_float > 0.0 { 1 } else { -1 };
         }
         let d = self.direction.map(i128::from);
         let exact = determinant(d, a.map(i128::from), b.map(i128::from));
-        let sign = if exact == 0 { self.side_if_shifted(d, a, b) } else { exact.signum() as i8 };
-        Side { sign, determinant: exact as f64 }
+        if exact == 0 { self.side_if_shifted(d, a, b) } else { exact.signum() as i8 }
     }
 
     /// d . ((a - e) x (b - e)) = d . (a x b) - d . (e x (b - a)) for a shift e.

@@ -18,7 +18,8 @@ use crate::{CurvilinearVolume, LayoutError};
 ///
 /// The faces of cells are taken for two triangles each, the same two for both cells at a face. Whether a ray crosses a triangle is decided
 /// by integers, in which positions are rounded to 2^-38 of half the longest edge of the volume's box. So a ray that leaves a cell
-/// enters the next one, or leaves the volume: none slips between cells, through an edge or a corner.
+/// enters the next one, or leaves the volume: none slips between cells, through an edge or a corner. Where it crosses (t) comes from positions
+/// that are not rounded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellWalker {
     volume: CurvilinearVolume,
