@@ -21,6 +21,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("brickfield-interp", &["core", "optics"]),
     ("brickfield-trim", &["core", "optics"]),
     ("brickfield-haar", &["core"]),
+    ("brickfield-curvilinear", &["core"]),
     ("brickfield-frame", &["core", "optics"]),
     ("brickfield-shaders", &["core", "optics", "frame"]),
     ("brickfield-cpu", &["core", "optics", "interp", "frame"]),
@@ -30,7 +31,20 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "brickfield-conformance",
         &[
-            "", "core", "optics", "io", "bricks", "lod", "interp", "trim", "haar", "frame", "shaders", "cpu", "wgpu",
+            "",
+            "core",
+            "optics",
+            "io",
+            "bricks",
+            "lod",
+            "interp",
+            "trim",
+            "haar",
+            "curvilinear",
+            "frame",
+            "shaders",
+            "cpu",
+            "wgpu",
             "ash",
         ],
     ),
@@ -38,8 +52,22 @@ const ALLOWED: &[(&str, &[&str])] = &[
 ];
 
 /// Everything below the front door; a name without prefix is short for `brickfield-` and that name, "" for `brickfield`.
-const BELOW: &[&str] =
-    &["core", "optics", "io", "bricks", "lod", "interp", "trim", "haar", "frame", "shaders", "cpu", "wgpu", "ash"];
+const BELOW: &[&str] = &[
+    "core",
+    "optics",
+    "io",
+    "bricks",
+    "lod",
+    "interp",
+    "trim",
+    "haar",
+    "curvilinear",
+    "frame",
+    "shaders",
+    "cpu",
+    "wgpu",
+    "ash",
+];
 
 /// Outside packages that only one package may name.
 const OWNED: &[(&str, &str)] = &[

@@ -1,0 +1,38 @@
+#![doc = include_str!("../README.md")]
+
+// The generated grids of the tests, which name this crate.
+#[cfg(test)]
+extern crate self as brickfield_curvilinear;
+#[cfg(test)]
+#[path = "../tests/laws/grids.rs"]
+#[allow(dead_code, reason = "each test uses some of them")]
+mod grids;
+
+mod axis;
+mod chart;
+mod check;
+mod frame_rate;
+mod grid;
+mod layout;
+mod mesh;
+mod octree;
+mod select;
+mod tree;
+mod view;
+mod volume;
+mod walk;
+mod zone;
+
+pub use axis::SplitAxis;
+pub use check::{MeshFault, check_mesh};
+pub use frame_rate::{FeedbackBudget, FrameTarget, FrameTime, FrameTimeError, PredictiveBudget};
+pub use grid::{CurvilinearGrid, CurvilinearGridError, End, GridEnds, HeightField, Node, Positions, hgt_value};
+pub use layout::{LayoutError, QuadLayout, Zone, ZoneRange};
+pub use mesh::{OtherGrid, SurrogateMesh, surrogate_mesh};
+pub use octree::{CellBox, OctLayout, OctLayoutError, OctZone};
+pub use select::{BudgetSelector, GranularityError, Label, Selection, SelectionError, SelectionWork, SizeSelector};
+pub use tree::{ByteAccount, QuadTree};
+pub use view::{View, ViewError};
+pub use volume::{CurvilinearVolume, CurvilinearVolumeError};
+pub use walk::{CellSegment, CellWalk, CellWalker, CellWalkerError, RayError};
+pub use zone::{Niceness, ZoneSummary, examine};
