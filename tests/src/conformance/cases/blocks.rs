@@ -121,7 +121,7 @@ fn equal() -> Vec<Case> {
     };
     // Short blocks at the ends; then two blocks along each axis.
     let coarse = |name: &str, dims: UVec3| {
-        picture(&format!("blocks/all-of-level-2-{name}"), catches![shader::NEAREST], move || {
+        picture(format!("blocks/all-of-level-2-{name}"), catches![shader::NEAREST], move || {
             let grid = Grid::axis_aligned(dims, DVec3::ONE).expect("a grid");
             let style = blended(Interblock::BoundarySplit);
             Setup::new(hills(&grid, ScalarType::U8), soft(ScalarType::U8)).blocks(
