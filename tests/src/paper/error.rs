@@ -53,6 +53,8 @@ pub enum PaperError {
     Shader(#[from] brickfield_shaders::ShaderError),
     #[error("a backend that was there: {source}")]
     Reopen { source: brickfield::BackendError },
+    #[error("a process of its own: {what}")]
+    OwnProcess { what: String },
     #[error("{backend} cannot evaluate single functions")]
     NoFunctions { backend: &'static str },
     #[error("{backend}: {source}")]

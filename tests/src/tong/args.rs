@@ -27,6 +27,9 @@ pub struct TongArgs {
     /// Voxels along a side of the generated volume of the part `batches`
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(32..=1024))]
     pub volume_side: u32,
+    /// Of the part `memory`, one algorithm alone: in a process of its own
+    #[arg(long, value_name = "ALGORITHM", hide = true)]
+    pub memory_of: Option<String>,
 }
 
 /// The parts of a run.

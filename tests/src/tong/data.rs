@@ -1,6 +1,6 @@
 //! The volumes that are rendered, and their scenes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use brickfield::bricks::{BrickTree, BuildOptions, build_tree};
@@ -32,8 +32,22 @@ pub(super) fn check_data(args: &TongArgs) -> Result<(), PaperError> {
 /// The volumes that are asked for, one by one.
 pub(super) fn data_sets(args: &TongArgs) -> Result<impl Iterator<Item = Result<DataSet, PaperError>>, PaperError> {
     let side = args.side;
-    let of_file = move |(name, path): (String, PathBuf)| of_subject(side, Subject::of_file(name, &path)?);
-    Ok(args.common.named(&DATA)?.into_iter().map(of_file))
+    Ok(files(args)?.into_iter().map(move |(name, path)| of_file(side, name, &path)))
+}
+
+/// The names of the volumes that are asked for, and their paths.
+pub(super) fn files(args: &TongArgs) -> Result<Vec<(String, PathBuf)>, PaperError> {
+    args.common.named(&DATA)
+}
+
+/// A volume of a file.
+pub(super) fn of_file(side: BrickSide, name: String, path: &Path) -> Result<DataSet, PaperError> {
+    of_subject(side, Subject::of_file(name, path)?)
+}
+
+/// A small generated volume.
+pub(super) fn small(args: &TongArgs) -> Result<DataSet, PaperError> {
+    of_subject(args.side, Subject::of_phantom(2 * args.side.n_samples()))
 }
 
 /// The volumes of the part `batches`: one of the data sets and a generated one, or those that are asked for.
@@ -43,7 +57,7 @@ pub(super) fn data_sets_of_batches(
     let is_own = args.common.files.is_empty() && args.common.only.is_none();
     let (side, volume_side) = (args.side, args.volume_side);
     let named = args.common.named(if is_own { &DATA[DATA.len() - 1..] } else { &DATA })?;
-    let of_file = move |(name, path): (String, PathBuf)| of_subject(side, Subject::of_file(name, &path)?);
+    let of_file = move |(name, path): (String, PathBuf)| of_file(side, name, &path);
     let generated = is_own.then_some(()).into_iter().map(move |()| of_subject(side, Subject::of_phantom(volume_side)));
     Ok(named.into_iter().map(of_file).chain(generated))
 }

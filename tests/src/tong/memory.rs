@@ -1,56 +1,117 @@
-//! Peaks of memory: of the process, and of the device's textures and lists.
+//! Peaks of memory: of the process, and of the device's textures and lists. Each algorithm has a process of its own on each backend.
+
+use std::path::Path;
+use std::process::Command;
+
+use brickfield_core::ValueRange;
+use serde::{Deserialize, Serialize};
 
 use super::TongArgs;
 use super::algorithm::Algorithm;
-use super::data::{Renderer, data_sets};
+use super::data::{DataSet, Renderer, files, of_file, small};
 use crate::compare::rivals::Rivals;
 use crate::memory::{peak, resident, restart_peak};
 use crate::paper::{Missed, PaperError, device_bytes, frame_of, mib, print};
 
-pub(super) fn run(args: &TongArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, PaperError> {
+/// What an algorithm takes, in bytes.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Taken {
+    /// The voxels, and the min-max arrays of all bricks.
+    voxels: u64,
+    arrays: u64,
+    /// The samples of the plan, on the host.
+    samples: u64,
+    /// The texture of the plan, padding included, and its lists.
+    device: u64,
+    /// The peak of the process above volume, octree and arrays; `None` where the system does not tell.
+    process: Option<u64>,
+}
+
+pub(super) fn run(args: &TongArgs, rivals: &Rivals) -> Result<Vec<Missed>, PaperError> {
     print(
         "Samples: those of the plan, on the host. Device: bytes of the plan's texture, padding included, and of its lists. Process: its peak above the volume, its octree and\n\
-         its min-max arrays, while a frame is prepared and rendered; software renderers hold the device's memory there, and what an algorithm before it left may be in use again.\n",
+         its min-max arrays, while a frame is prepared and rendered, each algorithm in a process of its own; software renderers hold the device's memory there.\n",
     )?;
-    for data_set in data_sets(args)? {
-        let data_set = data_set?;
-        let arrays: usize = data_set
-            .trimmed
-            .arrays()
-            .arrays()
-            .iter()
-            .map(|of_brick| of_brick.n_slices().element_sum() as usize * size_of::<brickfield_core::ValueRange>())
-            .sum();
-        print(&format!(
-            "{}: voxels {:.1} MiB, min-max arrays {:.2} MiB",
-            data_set.subject.name,
-            mib((data_set.subject.volume.voxels().len() * data_set.subject.volume.scalar_type().n_bytes()) as u64),
-            mib(arrays as u64)
-        ))?;
-        let scene = data_set.scene(args, Renderer::Rays, data_set.subject.transfer.clone())?;
-        for algorithm in Algorithm::all(args.side) {
-            let mut of_backends = Vec::new();
-            let mut of_plan = (0, 0);
-            for backend in &mut rivals.present {
-                restart_peak();
-                let before = resident();
-                let plan = algorithm.plan(&data_set, &scene)?;
-                frame_of(backend.as_mut(), &plan)?;
-                of_plan = (plan.field().slots().n_bytes() as u64, device_bytes(&plan));
-                let name = backend.describe().backend;
-                of_backends.push(match (peak(), before) {
-                    (Some(peak), Some(before)) => format!("{name} {:.1}", mib(peak.saturating_sub(before))),
-                    _ => format!("{name} unknown"),
-                });
+    let backends: Vec<_> = rivals.present.iter().map(|backend| backend.describe().backend).collect();
+    for (name, path) in files(args)? {
+        for (i, algorithm) in Algorithm::all(args.side).into_iter().enumerate() {
+            let taken = backends.iter().map(|backend| Ok((*backend, in_own_process(args, &path, algorithm, backend)?)));
+            let taken: Vec<_> = taken.collect::<Result<_, PaperError>>()?;
+            let Some((_, first)) = taken.first() else { continue };
+            if i == 0 {
+                print(&format!(
+                    "{name}: voxels {:.1} MiB, min-max arrays {:.2} MiB",
+                    mib(first.voxels),
+                    mib(first.arrays)
+                ))?;
             }
+            let process = |(backend, taken): &(&str, Taken)| match taken.process {
+                Some(bytes) => format!("{backend} {:.1}", mib(bytes)),
+                None => format!("{backend} unknown"),
+            };
             print(&format!(
                 "  {:<20} samples {:>8.2} MiB, device {:>8.2} MiB, process, MiB: {}",
                 algorithm.name(),
-                mib(of_plan.0),
-                mib(of_plan.1),
-                of_backends.join(", ")
+                mib(first.samples),
+                mib(first.device),
+                taken.iter().map(process).collect::<Vec<_>>().join(", ")
             ))?;
         }
     }
     Ok(Vec::new())
+}
+
+/// This program once more, for one algorithm on one backend.
+fn in_own_process(args: &TongArgs, file: &Path, algorithm: Algorithm, backend: &str) -> Result<Taken, PaperError> {
+    let fault = |what: String| PaperError::OwnProcess { what };
+    let program = std::env::current_exe().map_err(|e| fault(e.to_string()))?;
+    let mut command = Command::new(program);
+    command.args(["--paper", "tong", "--part", "memory", "--memory-of", algorithm.name(), "--backends", backend]);
+    let size = args.common.size;
+    command.args(["--size", &format!("{}x{}", size.x, size.y), "--step", &args.common.step.to_string()]);
+    command.args(["--side", &args.side.to_string()]);
+    if let Some(adapter) = &args.common.rivals.adapter {
+        command.args(["--adapter", adapter]);
+    }
+    let output = command.arg("--").arg(file).output().map_err(|e| fault(e.to_string()))?;
+    let said = || String::from_utf8_lossy(&output.stderr).trim().to_owned();
+    match serde_json::from_slice(&output.stdout) {
+        Ok(taken) if output.status.success() => Ok(taken),
+        _ => Err(fault(format!("{}: {}", output.status, said()))),
+    }
+}
+
+/// What one algorithm takes on the one backend, as JSON: the process is this one alone.
+pub(super) fn print_own(args: &TongArgs, name: &str) -> Result<(), PaperError> {
+    let all = Algorithm::all(args.side);
+    let algorithm = all.into_iter().find(|algorithm| algorithm.name() == name);
+    let algorithm = algorithm.ok_or_else(|| PaperError::OwnProcess { what: format!("no algorithm {name:?}") })?;
+    let mut rivals = args.common.rivals.open()?;
+    let backend = rivals.present[0].as_mut();
+    // A renderer compiles its shaders in its first frame.
+    let warm_up = small(args)?;
+    let scene = |data: &DataSet| data.scene(args, Renderer::Rays, data.subject.transfer.clone());
+    frame_of(backend, &algorithm.plan(&warm_up, &scene(&warm_up)?)?)?;
+    drop(warm_up);
+    let files = files(args)?;
+    let [(name, path)] = files.as_slice() else {
+        return Err(PaperError::OwnProcess { what: format!("{} files; one is measured at a time", files.len()) });
+    };
+    let data = of_file(args.side, name.clone(), path)?;
+    let scene = scene(&data)?;
+    restart_peak();
+    let before = resident();
+    let plan = algorithm.plan(&data, &scene)?;
+    frame_of(backend, &plan)?;
+    let process = peak().zip(before).map(|(peak, before)| peak.saturating_sub(before));
+    let n_slices = data.trimmed.arrays().arrays().iter().map(|of_brick| u64::from(of_brick.n_slices().element_sum()));
+    let volume = &data.subject.volume;
+    let taken = Taken {
+        voxels: (volume.voxels().len() * volume.scalar_type().n_bytes()) as u64,
+        arrays: n_slices.sum::<u64>() * size_of::<ValueRange>() as u64,
+        samples: plan.field().slots().n_bytes() as u64,
+        device: device_bytes(&plan),
+        process,
+    };
+    print(&serde_json::to_string(&taken).expect("plain numbers"))
 }

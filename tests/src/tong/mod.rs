@@ -26,6 +26,9 @@ use crate::paper::{Findings, PaperError};
 /// Data or a folder that cannot be had, a scene that is refused, a backend that fails.
 pub fn tong(args: &TongArgs) -> Result<Findings, PaperError> {
     data::check_data(args)?;
+    if let Some(name) = &args.memory_of {
+        return memory::print_own(args, name).map(|()| Findings::default());
+    }
     args.common.run(args.parts(), Part::title, |part, rivals| match part {
         Part::Counts => counts::run(),
         Part::Merge => merge::run(args),
