@@ -15,7 +15,7 @@ pub(crate) struct ForeignFormat {
 }
 
 const READ_FORMATS: &str =
-    "NRRD, MetaImage, NIfTI, MGH, VTI, legacy VTK, DICOM, OME-Zarr, TIFF and folders of TIFF or PNG slices are";
+    "NRRD, MetaImage, NIfTI, MGH, VTI, legacy VTK, DICOM, OME-Zarr, VOL, TIFF and folders of TIFF or PNG slices are";
 /// A PNG is one slice.
 const PNG: ForeignFormat =
     ForeignFormat { name: "a single PNG", hint: "a stack of slices opens as a folder: name the folder instead" };
@@ -33,11 +33,9 @@ const HDF5_MAGIC: &[u8; 8] = b"\x89HDF\r\n\x1a\n";
 
 /// The format of a file that begins like this; the extension tells MINC from what it is made of.
 pub(crate) fn foreign(head: &[u8], path: &Path) -> Option<ForeignFormat> {
-    const MAGICS: [(&[u8], &str); 6] = [
+    const MAGICS: [(&[u8], &str); 4] = [
         (b" BDV", "OpenVDB"),
         (b"\xff\xd8\xff", "JPEG"),
-        (b"VOLS\n", "SDSC VOL"),
-        (b"VOLB\n", "SDSC VOL"),
         (b"\0\0\0\x0cjP", "JPEG 2000"),
         (b"PK\x03\x04", "zip archive"),
     ];

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use crate::metaimage;
+use crate::{metaimage, vol};
 
 /// A volume file format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -20,12 +20,13 @@ pub enum Format {
     OmeZarr,
     Tiff,
     Pictures,
+    Vol,
     Raw,
 }
 
 impl Format {
     /// All formats.
-    pub const ALL: [Format; 11] = [
+    pub const ALL: [Format; 12] = [
         Format::Nrrd,
         Format::MetaImage,
         Format::Nifti,
@@ -36,6 +37,7 @@ impl Format {
         Format::OmeZarr,
         Format::Tiff,
         Format::Pictures,
+        Format::Vol,
         Format::Raw,
     ];
 
@@ -52,6 +54,7 @@ impl Format {
             Format::OmeZarr => "OME-Zarr",
             Format::Tiff => "TIFF",
             Format::Pictures => "folder of pictures",
+            Format::Vol => "VOL",
             Format::Raw => "raw",
         }
     }
@@ -69,6 +72,7 @@ impl Format {
             Format::OmeZarr => &["zarr"],
             Format::Tiff => &["tif", "tiff"],
             Format::Pictures => &[],
+            Format::Vol => &["vol"],
             Format::Raw => &["raw", "bin"],
         }
     }
@@ -76,7 +80,7 @@ impl Format {
     /// Whether [`open`](crate::open) in this build can read it. Raw files need [`open_raw`](crate::open_raw).
     pub const fn is_readable(self) -> bool {
         match self {
-            Format::Nrrd | Format::MetaImage | Format::VtkLegacy => true,
+            Format::Nrrd | Format::MetaImage | Format::VtkLegacy | Format::Vol => true,
             Format::Nifti => cfg!(feature = "nifti"),
             Format::Mgh => cfg!(feature = "mgh"),
             Format::Vti => cfg!(feature = "vti"),
@@ -108,6 +112,8 @@ impl Format {
             Some(Format::Nrrd)
         } else if head.starts_with(b"# vtk DataFile") {
             Some(Format::VtkLegacy)
+        } else if vol::has_magic(head) {
+            Some(Format::Vol)
         } else if head.get(128..132) == Some(b"DICM") {
             Some(Format::Dicom)
         } else if is_nifti(head) {

@@ -55,6 +55,7 @@ mod stored_type;
 mod stored_voxel;
 #[cfg(feature = "tiff")]
 pub mod tiff;
+pub mod vol;
 #[cfg(feature = "vti")]
 pub mod vti;
 mod vtk_arrays;

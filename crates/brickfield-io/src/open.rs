@@ -168,6 +168,7 @@ fn open_file(path: &Path, format: Format, options: &OpenOptions) -> Result<Opene
         #[cfg(feature = "vti")]
         Format::Vti => crate::vti::read(file, &folder, options),
         Format::VtkLegacy => vtk_legacy::read(file, options),
+        Format::Vol => crate::vol::read(file, options),
         // DICOMDIR: what it lists lies beside and below it.
         #[cfg(feature = "dicom")]
         Format::Dicom if crate::dicom::is_index(&file_name(path), &folder, &options.limits) => {

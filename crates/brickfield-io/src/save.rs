@@ -5,19 +5,20 @@ use std::path::Path;
 use brickfield_core::Volume;
 
 use crate::saved::{check_folder_of, folder_of};
-use crate::{ByteOrder, Format, SaveError, SaveOptions, Saved, metaimage, nrrd, raw};
+use crate::{ByteOrder, Format, SaveError, SaveOptions, Saved, metaimage, nrrd, raw, vol};
 
 /// Ends of names, and the formats that they stand for.
-const SAVED_FORMATS: [(&str, Format); 6] = [
+const SAVED_FORMATS: [(&str, Format); 7] = [
     (".nrrd", Format::Nrrd),
     (".mha", Format::MetaImage),
     (".nii", Format::Nifti),
     (".nii.gz", Format::Nifti),
     (".zarr", Format::OmeZarr),
+    (".vol", Format::Vol),
     (".raw", Format::Raw),
 ];
 
-/// Saves a volume in the format that the end of the name suggests: `.nrrd`, `.mha`, `.nii`, `.nii.gz`, `.zarr` or `.raw`.
+/// Saves a volume in the format that the end of the name suggests: `.nrrd`, `.mha`, `.nii`, `.nii.gz`, `.zarr`, `.vol` or `.raw`.
 ///
 /// Values, spacing and direction survive: a format that has no rescale gets the values (f32 if it holds all of them exactly,
 /// else f64). `.raw` holds the values alone. What the file does not state is noted in [`Saved::notes`].
@@ -32,6 +33,7 @@ pub fn save(path: &Path, volume: &Volume, options: &SaveOptions) -> Result<Saved
         Format::Nifti => crate::nifti::save(path, volume, options),
         #[cfg(feature = "ome-zarr")]
         Format::OmeZarr => crate::ome_zarr::save(path, volume, options),
+        Format::Vol => vol::save(path, volume, options),
         Format::Raw => raw::save(path, volume, ByteOrder::Little),
         format => Err(feature_off(path, format)),
     }
@@ -78,7 +80,7 @@ mod tests {
     #[test]
     fn messages_list_the_ends_of_names() {
         let ends = SAVED_FORMATS.map(|(end, _)| end);
-        let listed = [&ends[..5].join(", "), ends[5]].join(" and ");
+        let listed = [&ends[..6].join(", "), ends[6]].join(" and ");
         assert_eq!(listed, SAVED_EXTENSIONS);
     }
 }

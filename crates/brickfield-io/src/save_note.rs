@@ -27,6 +27,8 @@ pub enum SaveNote {
     FrameLost { format: Format, frame: WorldFrame, read_as: WorldFrame },
     /// The format has no words for the unit of lengths; they are the same numbers.
     UnitLost { format: Format, unit: String },
+    /// The format states no spacing, place or direction: the file is read with a spacing of 1.
+    PlacementLost { format: Format },
     /// Nothing but samples was written; `spec` is what `brickfield --raw` must be told.
     SamplesAlone { spec: String },
     /// OME-Zarr has no words for the direction of axes; it is stated in an attribute of our own.
@@ -82,6 +84,9 @@ impl fmt::Display for SaveNote {
             }
             SaveNote::UnitLost { format, unit } => {
                 write!(f, "{format} cannot state the unit {unit:?}; lengths are the same numbers without it")
+            }
+            SaveNote::PlacementLost { format } => {
+                write!(f, "{format} states no spacing, place or direction: the file is read with a spacing of 1")
             }
             SaveNote::SamplesAlone { spec } => {
                 write!(

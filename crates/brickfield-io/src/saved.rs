@@ -71,7 +71,7 @@ pub enum SaveError {
 }
 
 /// The ends of names that [`save`](crate::save()) knows, for messages and help texts.
-pub const SAVED_EXTENSIONS: &str = ".nrrd, .mha, .nii, .nii.gz, .zarr and .raw";
+pub const SAVED_EXTENSIONS: &str = ".nrrd, .mha, .nii, .nii.gz, .zarr, .vol and .raw";
 
 /// The values of a volume's voxels: as they are stored if they stand for themselves, else f32 if that holds all of them
 /// exactly, else f64.

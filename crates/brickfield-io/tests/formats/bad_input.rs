@@ -39,6 +39,12 @@ pub(crate) fn cases() -> Vec<BadFile> {
             absurd: (b"4 3 2", b"16384 16384 4096", "1099511627776 bytes; the limit is"),
             unsupported: (b"unsigned_char", b"string", "array type \"string\" is not supported"),
         },
+        BadFile {
+            name: "v.vol",
+            good: [&b"VOLS\n\0\0\0\x04\0\0\0\x03\0\0\0\x02"[..], &[1; 24]].concat(),
+            absurd: (b"\0\0\0\x04\0\0\0\x03", b"\0\x08\0\0\0\x10\0\0", "1099511627776 bytes; the limit is"),
+            unsupported: (b"VOLS\n", b"VOLS2", "version \"VOLS2"),
+        },
     ];
     #[cfg(feature = "vti")]
     cases.push(BadFile {

@@ -45,6 +45,7 @@ const TEXT: &[(&str, &str)] = &[
         "not VTK XML ImageData: the start of the file is \"hello world\\n\", expected XML with the root element VTKFile",
     ),
     ("v.vtk", "not legacy VTK: the start of the file is \"hello world\", expected # vtk DataFile Version"),
+    ("v.vol", "not VOL: the start of the file is \"hello world\\n\", expected VOLS, VOLB, VOLC or #VOLC"),
     #[cfg(feature = "tiff")]
     ("v.tif", "not TIFF: the start of the file is \"hello world\\n\", expected II or MM, then 42 or 43"),
     #[cfg(feature = "dicom")]

@@ -45,6 +45,7 @@ mod tiff_imagej;
 mod tiff_layout;
 #[cfg(feature = "tiff")]
 mod tiff_ome;
+mod vol;
 #[cfg(feature = "vti")]
 mod vti;
 #[cfg(feature = "vti")]

@@ -175,7 +175,9 @@ fn the_end_of_the_name_is_the_format() {
         message
     };
     for name in ["volume.tif", "volume", ".nrrd", "nrrd"] {
-        assert!(refusal(name).ends_with("the end of the name is none of .nrrd, .mha, .nii, .nii.gz, .zarr and .raw"));
+        assert!(
+            refusal(name).ends_with("the end of the name is none of .nrrd, .mha, .nii, .nii.gz, .zarr, .vol and .raw")
+        );
     }
     let message = refusal("none/volume.nrrd");
     let folders = (folder.path().join("none/volume.nrrd"), folder.path().join("none"));

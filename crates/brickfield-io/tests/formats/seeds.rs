@@ -15,6 +15,7 @@ fn seeds_for_fuzzing() {
             Some(Format::Nifti) => "nifti",
             Some(Format::Mgh) => "mgh",
             Some(Format::Vti) => "vti",
+            Some(Format::Vol) => "vol",
             Some(Format::VtkLegacy) => "vtk_legacy",
             _ => "dicom",
         };
@@ -36,6 +37,9 @@ fn seeds_for_fuzzing() {
     #[cfg(feature = "mgh")]
     for (i, file) in crate::mgh::examples().iter().enumerate() {
         write(folder, "mgh", &format!("{i}.mgh"), file);
+    }
+    for (i, file) in crate::vol::examples().iter().enumerate() {
+        write(folder, "vol", &format!("{i}.vol"), file);
     }
     for (i, file) in crate::nrrd_axes::examples().iter().enumerate() {
         write(folder, "nrrd", &format!("{i}.nrrd"), file.as_bytes());
