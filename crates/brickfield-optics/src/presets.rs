@@ -23,8 +23,15 @@ pub enum Preset {
     MrDefault,
     /// White, extinction proportional to the value: the picture of a density.
     Ramp,
-    /// From black to white, extinction proportional to the value.
+    /// From black to white, extinction proportional to the value, but for the darkest twentieth, which is transparent.
     Gray,
+    /// From black to white, extinction proportional to the value: the linear mapping of Saladi, Pinnamaneni and Meyer 2003.
+    Linear,
+    /// From black to white, extinction an exponential of the value, e^5 times as much at the end as at the start, less what it is there: the exponential
+    /// mapping of the same paper.
+    Exponential,
+    /// From black to white, transparent below the middle of the range and dense above: the threshold mapping of the same paper.
+    Threshold,
     /// Viridis: perceptually uniform, from blue to yellow (Smith and van der Walt 2015, CC0).
     Viridis,
     /// Inferno: perceptually uniform, from black through red to light yellow (same source).
@@ -39,7 +46,7 @@ pub enum Preset {
 
 impl Preset {
     /// All presets, presets for Hounsfield units first.
-    pub const ALL: [Preset; 12] = [
+    pub const ALL: [Preset; 15] = [
         Preset::CtBone,
         Preset::CtSoftTissue,
         Preset::CtLung,
@@ -47,6 +54,9 @@ impl Preset {
         Preset::MrDefault,
         Preset::Ramp,
         Preset::Gray,
+        Preset::Linear,
+        Preset::Exponential,
+        Preset::Threshold,
         Preset::Viridis,
         Preset::Inferno,
         Preset::Magma,
@@ -64,6 +74,9 @@ impl Preset {
             Preset::MrDefault => "mr-default",
             Preset::Ramp => "ramp",
             Preset::Gray => "gray",
+            Preset::Linear => "linear",
+            Preset::Exponential => "exponential",
+            Preset::Threshold => "threshold",
             Preset::Viridis => "viridis",
             Preset::Inferno => "inferno",
             Preset::Magma => "magma",
@@ -123,6 +136,9 @@ impl Preset {
             Preset::MrDefault => &MR_DEFAULT,
             Preset::Ramp => &RAMP,
             Preset::Gray => &GRAY,
+            Preset::Linear => &LINEAR,
+            Preset::Exponential => &EXPONENTIAL,
+            Preset::Threshold => &THRESHOLD,
             Preset::Viridis => &VIRIDIS,
             Preset::Inferno => &INFERNO,
             Preset::Magma => &MAGMA,
@@ -147,6 +163,28 @@ type PresetKnot = (f64, f64, u32);
 /// Optical depth of the brightest value over the volume's diagonal.
 const FULL: f64 = 60.0;
 
+/// [`FULL`] (e^(5 v) - 1) / (e^5 - 1) at the knots.
+const EXPONENTIAL: [PresetKnot; 17] = [
+    (0.0, 0.000000, 0x000000),
+    (0.0625, 0.149310, 0x101010),
+    (0.125, 0.353393, 0x202020),
+    (0.1875, 0.632341, 0x303030),
+    (0.25, 1.013618, 0x404040),
+    (0.3125, 1.534761, 0x505050),
+    (0.375, 2.247080, 0x606060),
+    (0.4375, 3.220704, 0x707070),
+    (0.5, 4.551491, 0x808080),
+    (0.5625, 6.370460, 0x8f8f8f),
+    (0.625, 8.856697, 0x9f9f9f),
+    (0.6875, 12.254980, 0xafafaf),
+    (0.75, 16.899881, 0xbfbfbf),
+    (0.8125, 23.248709, 0xcfcfcf),
+    (0.875, 31.926528, 0xdfdfdf),
+    (0.9375, 43.787700, 0xefefef),
+    (1.0, 60.000000, 0xffffff),
+];
+const THRESHOLD: [PresetKnot; 4] =
+    [(0.0, 0.0, 0x000000), (0.5, 0.0, 0x808080), (0.5, FULL, 0x808080), (1.0, FULL, 0xffffff)];
 const CT_BONE: [PresetKnot; 5] = [
     (150.0, 0.0, 0x5a1e14),
     (280.0, 0.03, 0xa8603c),
@@ -176,6 +214,7 @@ const CT_SKIN: [PresetKnot; 4] =
 const MR_DEFAULT: [PresetKnot; 5] =
     [(0.1, 0.0, 0x301c18), (0.25, 1.5, 0x80483c), (0.5, 12.0, 0xc88c70), (0.75, 40.0, 0xf0d8c0), (1.0, 80.0, 0xffffff)];
 const RAMP: [PresetKnot; 2] = [(0.05, 0.0, 0xffffff), (1.0, 20.0, 0xffffff)];
+const LINEAR: [PresetKnot; 2] = [(0.0, 0.0, 0x000000), (1.0, FULL, 0xffffff)];
 const GRAY: [PresetKnot; 2] = [(0.05, 0.0, 0x000000), (1.0, FULL, 0xffffff)];
 
 /// Nine equidistant colours of a map, the first transparent, extinction rising with the square of the value: rare, high
@@ -240,6 +279,19 @@ mod tests {
         assert_eq!((tf.at(80.0).extinction, tf.at(-15.0).extinction), (2.0, 0.0));
         assert!(Preset::Ramp.transfer(RANGE, 0.0).is_err());
         assert!(Preset::Gray.transfer(ValueRange { min: f64::MIN, max: f64::MAX }, 1.0).is_err());
+    }
+
+    #[test]
+    fn the_mappings_of_saladi_pinnamaneni_and_meyer_have_their_names() {
+        let unit = ValueRange { min: 0.0, max: 1.0 };
+        let [linear, exponential, threshold] = ["linear", "exponential", "threshold"]
+            .map(|name| Preset::from_name(name).unwrap().transfer(unit, 1.0).unwrap());
+        for knot in exponential.knots() {
+            let expected = FULL * ((5.0 * knot.value).exp() - 1.0) / (5f64.exp() - 1.0);
+            assert!((knot.extinction - expected).abs() < 1e-6, "{knot:?} {expected}");
+            assert!((linear.at(knot.value).extinction - FULL * knot.value).abs() < 1e-9);
+        }
+        assert_eq!((threshold.at(0.499).extinction, threshold.at(0.5).extinction), (0.0, FULL));
     }
 
     #[test]
