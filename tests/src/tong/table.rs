@@ -61,10 +61,10 @@ pub(super) fn run(args: &TongArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, P
                 renderer == Renderer::Rays || backend.describe().backend != BackendKind::Cpu.name()
             };
             for backend in rivals.present.iter_mut().filter(|backend| draws(backend.as_ref())) {
-                let of_backend = contest(args, backend.as_mut(), &data_set, (renderer, &scene), &prepared)?;
+                let of_backend =
+                    contest(args, backend.as_mut(), (&data_set, empty_share), (renderer, &scene), &prepared)?;
                 print(HEADER)?;
                 for row in of_backend {
-                    let row = TableRow { empty_share, ..row };
                     print(&line(&row))?;
                     missed.extend(other_picture(&row));
                     rows.push(row);
@@ -106,7 +106,7 @@ fn prepared(args: &TongArgs, data: &DataSet, scene: &Scene) -> Result<Vec<Prepar
 fn contest(
     args: &TongArgs,
     backend: &mut dyn Backend,
-    data: &DataSet,
+    (data, empty_share): (&DataSet, f64),
     (renderer, scene): (Renderer, &Scene),
     prepared: &[Prepared],
 ) -> Result<Vec<TableRow>, PaperError> {
@@ -124,7 +124,7 @@ fn contest(
     let pictures: Vec<Image<f32>> = pictures.into_iter().map(|picture| picture.expect("all had their turns")).collect();
     let row = |(i, prepared): (usize, &Prepared)| TableRow {
         data: data.subject.name.clone(),
-        empty_share: 0.0,
+        empty_share,
         renderer: renderer.name(),
         backend: backend.describe().backend,
         algorithm: prepared.algorithm.name(),

@@ -119,6 +119,13 @@ pub(super) struct Held {
     index: Option<Arc<IndexGrid>>,
 }
 
+/// The pages of a batch: those that were there, and those that were brought, with their bytes.
+pub(super) struct Admitted {
+    pub(super) n_there: usize,
+    pub(super) n_brought: usize,
+    pub(super) n_bytes: u64,
+}
+
 impl TrimCache {
     /// An empty cache.
     pub fn new(options: CacheOptions) -> TrimCache {
@@ -269,7 +276,7 @@ impl Held {
         source: &TrimmedVolume,
         needed: &BTreeSet<usize>,
         distance: impl Fn(usize, u64) -> u64,
-    ) -> [u64; 3] {
+    ) -> Admitted {
         self.n_batches += 1;
         let (there, missing): (Vec<usize>, Vec<usize>) = needed.iter().partition(|page| self.places[**page].is_some());
         for page in &missing {
@@ -290,7 +297,7 @@ impl Held {
         for (brick, chunk) in chunks {
             self.chunks[brick] = Some(chunk);
         }
-        [there.len() as u64, missing.len() as u64, n_bytes]
+        Admitted { n_there: there.len(), n_brought: missing.len(), n_bytes }
     }
 
     /// The samples that are in the cache, each at its place.

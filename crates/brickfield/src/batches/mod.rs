@@ -79,10 +79,11 @@ impl Iterator for TrimBatches<'_> {
                 next.or(uses.first().map(|first| first + n)).unwrap_or(usize::MAX) as u64
             }
         };
-        let [hits, misses, n_bytes] = held.admit(self.source, &batch.pages, distance);
+        let admitted = held.admit(self.source, &batch.pages, distance);
         let counts = &mut self.cache.counts;
-        (counts.n_hits, counts.n_misses) = (counts.n_hits + hits as usize, counts.n_misses + misses as usize);
-        counts.n_bytes += n_bytes;
+        counts.n_hits += admitted.n_there;
+        counts.n_misses += admitted.n_brought;
+        counts.n_bytes += admitted.n_bytes;
         let (field, dark) = held.field(self.source.layout(), &batch.drawn, &batch.lent);
         let parts = PlanParts::new(field, self.rays, self.domain, self.sampling, self.transfer.clone());
         let drawing = match self.target {
