@@ -42,6 +42,10 @@ pub enum PackError {
     Open(#[from] OpenError),
     #[error(transparent)]
     Save(#[from] SaveError),
+    #[error("{}: a store is a folder of OME-Zarr; the end of the name is that of {format}: take .zarr", path.display())]
+    NotZarr { path: PathBuf, format: Format },
+    #[error("{}: the store would lie inside of {}, which is packed", path.display(), input.display())]
+    IntoInput { path: PathBuf, input: PathBuf },
     #[error("{}: {fault}", path.display())]
     Slices { path: PathBuf, fault: SliceError },
     #[error("{}: values rescaled by slope {} and intercept {} reach from {} to {}; they must be finite", path.display(), rescale.slope(), rescale.intercept(), range.min, range.max)]
@@ -66,6 +70,7 @@ pub fn pack(
     options: &SaveOptions,
     progress: &mut dyn FnMut(PackProgress),
 ) -> Result<Packed, PackError> {
+    check_store_path(path, store)?;
     let mut source = open()?;
     let facts = source.facts().clone();
     let dims = facts.grid.dims();
@@ -100,6 +105,22 @@ pub fn pack(
     let mut facts = VolumeFacts { notes: source.facts().notes.clone(), ..facts };
     facts.notes.extend(values.note(survey.non_finite));
     Ok(Packed { facts, scalar: values.scalar, coarsest, notes })
+}
+
+/// Refuses names of other formats, and places inside of what is packed.
+fn check_store_path(input: &Path, store: &Path) -> Result<(), PackError> {
+    match Format::from_extension(store) {
+        None | Some(Format::OmeZarr) => {}
+        Some(format) => return Err(PackError::NotZarr { path: store.to_owned(), format }),
+    }
+    let folder = store.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match (input.canonicalize(), folder.canonicalize()) {
+        (Ok(real), Ok(folder)) if folder.starts_with(&real) => {
+            Err(PackError::IntoInput { path: store.to_owned(), input: input.to_owned() })
+        }
+        // Files that are not there are named by those who open them.
+        _ => Ok(()),
+    }
 }
 
 /// The next slices, and their number.

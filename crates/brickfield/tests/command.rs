@@ -78,6 +78,18 @@ fn pack_makes_a_store_that_is_read_like_the_file() {
         ["a.nrrd", "a.zarr"].map(|name| open(&place.path().join(name), &OpenOptions::default()).unwrap().volume);
     assert_eq!(a.voxels(), b.voxels());
     // Once more it is refused, before any work, and with what is wrong of the file nothing is left.
+    for (words, expected) in [
+        (
+            "pack|a.nrrd|-o|b.tif",
+            "b.tif: a store is a folder of OME-Zarr; the end of the name is that of TIFF: take .zarr",
+        ),
+        ("pack|a.zarr|-o|a.zarr/b.zarr", "a.zarr/b.zarr: the store would lie inside of a.zarr, which is packed"),
+    ] {
+        let refused = place.run(words);
+        assert_eq!(refused.status.code(), Some(2));
+        assert!(text(&refused.stderr).contains(expected), "{}", text(&refused.stderr));
+        assert!(!place.path().join("b.tif").exists() && !place.path().join("a.zarr/b.zarr").exists());
+    }
     let again = place.run("pack|a.nrrd|-o|a.zarr");
     assert_eq!(again.status.code(), Some(2));
     assert!(text(&again.stderr).contains("a.zarr: there is one already"), "{}", text(&again.stderr));

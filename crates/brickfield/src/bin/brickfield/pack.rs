@@ -18,6 +18,7 @@ pub(crate) fn run(args: &PackArgs) -> Result<(), Failure> {
     bar.finish_and_clear();
     let packed = packed.map_err(|e| match e {
         PackError::Save(e @ (SaveError::IsThere { .. } | SaveError::NoFolder { .. })) => Failure::usage(e),
+        e @ (PackError::NotZarr { .. } | PackError::IntoInput { .. }) => Failure::usage(e),
         other => other.into(),
     })?;
     packed.facts.notes.iter().for_each(|note| eprintln!("note: {note}"));
