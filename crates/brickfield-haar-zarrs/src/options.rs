@@ -195,12 +195,13 @@ mod tests {
 
     #[test]
     fn options_are_held_to_the_same_bounds() {
-        let error = HaarOptions { n_levels: Some(16), ..HaarOptions::default() }.checked().unwrap_err();
-        assert!(error.to_string().contains("levels = 16"), "{error}");
-        let error = HaarOptions { kernels: Vec::new(), ..HaarOptions::default() }.checked().unwrap_err();
-        assert!(error.to_string().contains("kernels = []"), "{error}");
-        let error = HaarOptions { max_error: 1 << 31, ..HaarOptions::default() }.checked().unwrap_err();
-        assert!(error.to_string().contains("max_error = 2147483648"), "{error}");
+        let error = |options| crate::HaarCodec::new(options).unwrap_err().to_string();
+        let levels = error(HaarOptions { n_levels: Some(16), ..HaarOptions::default() });
+        assert!(levels.contains("levels = 16"), "{levels}");
+        let kernels = error(HaarOptions { kernels: Vec::new(), ..HaarOptions::default() });
+        assert!(kernels.contains("kernels = []"), "{kernels}");
+        let max_error = error(HaarOptions { max_error: 1 << 31, ..HaarOptions::default() });
+        assert!(max_error.contains("max_error = 2147483648"), "{max_error}");
     }
 
     /// `schema.json` is what a registry or another reader goes by.
