@@ -17,6 +17,8 @@ const KEPT_OUT: &[(&str, &[&[&str]])] = &[
     ("brickfield-interp", &[FILES, COLORS, COMMANDS, GRAPHICS]),
     ("brickfield-trim", &[FILES, COLORS, COMMANDS, GRAPHICS]),
     ("brickfield-haar", &[FILES, COLORS, COMMANDS, GRAPHICS]),
+    // Zarr's metadata are JSON.
+    ("brickfield-haar-zarrs", &[&["exr", "flate2", "image", "tempfile", "toml"], COLORS, COMMANDS, GRAPHICS]),
     ("brickfield-curvilinear", &[FILES, COLORS, COMMANDS, GRAPHICS]),
     ("brickfield-frame", &[FILES, COLORS, COMMANDS, GRAPHICS]),
     ("brickfield-shaders", &[FILES, COLORS, COMMANDS, &["ash", "wgpu"]]),

@@ -21,6 +21,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("brickfield-interp", &["core", "optics"]),
     ("brickfield-trim", &["core", "optics"]),
     ("brickfield-haar", &["core"]),
+    ("brickfield-haar-zarrs", &["core", "haar"]),
     ("brickfield-curvilinear", &["core"]),
     ("brickfield-frame", &["core", "optics"]),
     ("brickfield-shaders", &["core", "optics", "frame"]),
