@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
+use brickfield::frame::ShaderChoice;
 use brickfield_core::ValueRange;
 use serde::{Deserialize, Serialize};
 
@@ -88,7 +89,8 @@ pub(super) fn print_own(args: &TongArgs, name: &str) -> Result<(), PaperError> {
     let algorithm = algorithm.ok_or_else(|| PaperError::OwnProcess { what: format!("no algorithm {name:?}") })?;
     let mut rivals = args.common.rivals.open()?;
     let backend = rivals.present[0].as_mut();
-    // A renderer compiles its shaders in its first frame.
+    // A renderer compiles its shaders in its first frame: the general one is the same for the small volume.
+    backend.choose_shaders(ShaderChoice::General);
     let warm_up = small(args)?;
     let scene = |data: &DataSet| data.scene(args, Renderer::Rays, data.subject.transfer.clone());
     frame_of(backend, &algorithm.plan(&warm_up, &scene(&warm_up)?)?)?;
