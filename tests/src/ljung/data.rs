@@ -10,7 +10,7 @@ use brickfield::lod::{
     BlockBudget, BlockErrors, BlockSelection, BudgetSize, OneSampleBlocks, Slab, select_block_levels,
 };
 use brickfield::{Scene, Viewpoint};
-use brickfield_core::{TransferFunction, Volume};
+use brickfield_core::{ScalarType, TransferFunction, Volume};
 
 use super::LjungArgs;
 use crate::paper::{PaperError, Subject};
@@ -38,7 +38,7 @@ pub(super) fn data_sets<'a>(
     args: &'a LjungArgs,
 ) -> Result<impl Iterator<Item = Result<DataSet, PaperError>> + use<'a>, PaperError> {
     let is_own = args.common.files.is_empty() && args.common.only.is_none();
-    let generated = is_own.then(|| of_subject(args, Subject::of_phantom(args.volume_side)));
+    let generated = is_own.then(|| of_subject(args, Subject::of_phantom(args.volume_side, ScalarType::U8)));
     Ok(args.common.named(&DATA)?.into_iter().map(|(name, path)| of_file(args, name, path)).chain(generated))
 }
 

@@ -29,8 +29,8 @@ impl Subject {
     }
 
     /// The phantom, of so many voxels along each side.
-    pub(crate) fn of_phantom(side: u32) -> Subject {
-        let Phantom { volume, transfer, .. } = phantom_of(UVec3::splat(side), ScalarType::U8);
+    pub(crate) fn of_phantom(side: u32, scalar: ScalarType) -> Subject {
+        let Phantom { volume, transfer, .. } = phantom_of(UVec3::splat(side), scalar);
         Subject { name: format!("generated {side}^3"), volume: Arc::new(volume), transfer, frame: WorldFrame::Lps }
     }
 }

@@ -7,7 +7,7 @@ use brickfield::bricks::{BrickTree, BuildOptions, build_tree};
 use brickfield::frame::{Division, Mode, Placement, Target};
 use brickfield::trim::DarkValues;
 use brickfield::{Scene, Technique, TrimmedVolume, Viewpoint};
-use brickfield_core::{BrickSide, Scalar, TransferFunction, ValueRange, with_voxels};
+use brickfield_core::{BrickSide, Scalar, ScalarType, TransferFunction, ValueRange, with_voxels};
 use rayon::prelude::*;
 
 use super::TongArgs;
@@ -45,9 +45,9 @@ pub(super) fn of_file(side: BrickSide, name: String, path: &Path) -> Result<Data
     of_subject(side, Subject::of_file(name, path)?)
 }
 
-/// A small generated volume.
-pub(super) fn small(args: &TongArgs) -> Result<DataSet, PaperError> {
-    of_subject(args.side, Subject::of_phantom(2 * args.side.n_samples()))
+/// A small generated volume of a type.
+pub(super) fn small(args: &TongArgs, scalar: ScalarType) -> Result<DataSet, PaperError> {
+    of_subject(args.side, Subject::of_phantom(2 * args.side.n_samples(), scalar))
 }
 
 /// The volumes of the part `batches`: one of the data sets and a generated one, or those that are asked for.
@@ -58,7 +58,10 @@ pub(super) fn data_sets_of_batches(
     let (side, volume_side) = (args.side, args.volume_side);
     let named = args.common.named(if is_own { &DATA[DATA.len() - 1..] } else { &DATA })?;
     let of_file = move |(name, path): (String, PathBuf)| of_file(side, name, &path);
-    let generated = is_own.then_some(()).into_iter().map(move |()| of_subject(side, Subject::of_phantom(volume_side)));
+    let generated = is_own
+        .then_some(())
+        .into_iter()
+        .map(move |()| of_subject(side, Subject::of_phantom(volume_side, ScalarType::U8)));
     Ok(named.into_iter().map(of_file).chain(generated))
 }
 

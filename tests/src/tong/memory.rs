@@ -89,17 +89,17 @@ pub(super) fn print_own(args: &TongArgs, name: &str) -> Result<(), PaperError> {
     let algorithm = algorithm.ok_or_else(|| PaperError::OwnProcess { what: format!("no algorithm {name:?}") })?;
     let mut rivals = args.common.rivals.open()?;
     let backend = rivals.present[0].as_mut();
-    // A renderer compiles its shaders in its first frame: the general one is the same for the small volume.
-    backend.choose_shaders(ShaderChoice::General);
-    let warm_up = small(args)?;
-    let scene = |data: &DataSet| data.scene(args, Renderer::Rays, data.subject.transfer.clone());
-    frame_of(backend, &algorithm.plan(&warm_up, &scene(&warm_up)?)?)?;
-    drop(warm_up);
     let files = files(args)?;
     let [(name, path)] = files.as_slice() else {
         return Err(PaperError::OwnProcess { what: format!("{} files; one is measured at a time", files.len()) });
     };
     let data = of_file(args.side, name.clone(), path)?;
+    // A renderer compiles its shaders in its first frame: the general one is the same for a small volume of the same type.
+    backend.choose_shaders(ShaderChoice::General);
+    let scene = |data: &DataSet| data.scene(args, Renderer::Rays, data.subject.transfer.clone());
+    let warm_up = small(args, data.subject.volume.scalar_type())?;
+    frame_of(backend, &algorithm.plan(&warm_up, &scene(&warm_up)?)?)?;
+    drop(warm_up);
     let scene = scene(&data)?;
     restart_peak();
     let before = resident();
