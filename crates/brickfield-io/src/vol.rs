@@ -122,7 +122,7 @@ fn read_from(source: &mut dyn ByteSource, options: &OpenOptions) -> Result<Opene
 
 /// Whether this is how a VOL file begins, of any version.
 pub(crate) fn has_magic(head: &[u8]) -> bool {
-    [&b"VOLS"[..], b"VOLB", b"VOLC", b"#VOLC"].iter().any(|magic| head.starts_with(magic))
+    Kind::ALL.iter().any(|(line, _)| head.starts_with(line.trim_ascii_end()))
 }
 
 /// Bytes of a file that is none, for the message.

@@ -5,9 +5,10 @@
 /// Frames of a session differ little from one to the next; of each pair of turns the order is turned round, so that a slow change favours neither.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Trial {
-    /// Milliseconds of frames: the variant's own shader, the general one. The first frame of each does not count: drivers finish compiling in it.
+    /// Milliseconds of frames: the variant's own shader, the general one.
     ms: [Vec<f64>; 2],
-    n_first: [bool; 2],
+    /// Whether each has drawn its first frame, which does not count: drivers finish compiling in it.
+    has_begun: [bool; 2],
 }
 
 /// Pairs of turns after which the smaller median decides.
@@ -19,7 +20,8 @@ impl Trial {
     /// Whether the general shader draws the next frame.
     pub(crate) fn general_is_next(&self) -> bool {
         self.general_is_quicker().unwrap_or_else(|| {
-            let n_turns = self.ms.iter().map(Vec::len).sum::<usize>() + self.n_first.iter().filter(|f| **f).count();
+            let n_turns =
+                self.ms.iter().map(Vec::len).sum::<usize>() + self.has_begun.iter().filter(|begun| **begun).count();
             matches!(n_turns % 4, 1 | 2)
         })
     }
@@ -30,9 +32,9 @@ impl Trial {
         if self.general_is_quicker().is_some() {
             return;
         }
-        match self.n_first[which] {
+        match self.has_begun[which] {
             true => self.ms[which].push(ms),
-            false => self.n_first[which] = true,
+            false => self.has_begun[which] = true,
         }
     }
 

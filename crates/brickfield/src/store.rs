@@ -95,7 +95,7 @@ impl StoreBlocks {
 
     fn of_levels(
         path: &Path,
-        levels: ZarrLevels,
+        mut levels: ZarrLevels,
         side: BlockSide,
         limits: StoreLimits,
         progress: &mut dyn FnMut(SummaryProgress),

@@ -190,13 +190,13 @@ fn summaries_come_back() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.zarr");
     write(&path, &grid(DIMS), ScalarType::I16, 32, &options(Compression::Lossless));
-    let store = levels(&path);
+    let mut store = levels(&path);
     assert_eq!(store.block_summaries(BlockSide::V16).unwrap(), Some(summaries(BlockSide::V16)));
     assert_eq!(store.block_summaries(BlockSide::V32).unwrap(), Some(summaries(BlockSide::V32)));
     assert_eq!(store.block_summaries(BlockSide::V8).unwrap(), None);
     let mut small = OpenOptions::default();
     small.limits.max_bytes = 100_000;
-    let small = ZarrLevels::open(&path, &small, 0).unwrap();
+    let mut small = ZarrLevels::open(&path, &small, 0).unwrap();
     fs::remove_file(path.join("brickfield_blocks/32/c/1/0/0/0")).unwrap();
     let fault = store.block_summaries(BlockSide::V32).unwrap_err().to_string();
     assert!(fault.contains("chunk [1, 0, 0, 0] of array \"brickfield_blocks/32\" is not stored"), "{fault}");

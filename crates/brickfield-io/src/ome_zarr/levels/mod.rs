@@ -41,8 +41,6 @@ pub struct ZarrLevels {
     /// Path of the group of the image.
     group: String,
     is_packed: bool,
-    /// Packed, and not changed since.
-    has_own_samples: bool,
     store: ReadableStorage,
     limits: Limits,
     cache: Cache,
@@ -97,19 +95,11 @@ impl ZarrLevels {
             check_bytes(level.parts.n_bytes(), &options.limits, what)?;
         }
         let group = image.path.rsplit_once('/').map_or("", |(group, _)| group).to_owned();
-        let mut facts = found.described(grid, shape.scalar, Rescale::IDENTITY)?;
-        // The digest is of all levels.
-        let is_finest = facts.choices.iter().all(|choice| choice.read == 0);
-        let has_own_samples = image.is_packed && is_finest && is_as_packed(&store, &group, &levels)?;
-        if image.is_packed && is_finest && !has_own_samples {
-            facts.notes.push(Note::ChangedStore);
-        }
         Ok(ZarrLevels {
-            facts,
+            facts: found.described(grid, shape.scalar, Rescale::IDENTITY)?,
             levels,
             group,
             is_packed: image.is_packed,
-            has_own_samples,
             store,
             limits: options.limits,
             cache: Cache::new(cache_bytes),
@@ -274,13 +264,20 @@ impl ZarrLevels {
     }
 
     /// The summaries of all blocks of a side, if [`PyramidWriter`](super::PyramidWriter) stored them, the finest level was asked for, and nobody
-    /// has changed the samples since ([`Note::ChangedStore`]).
+    /// has changed the samples since: the facts have [`Note::ChangedStore`] then.
     ///
     /// # Errors
     /// Arrays that do not fit the volume or are damaged; more bytes than the limits.
-    pub fn block_summaries(&self, side: BlockSide) -> Result<Option<Vec<BlockSummary>>, ReadError> {
+    pub fn block_summaries(&mut self, side: BlockSide) -> Result<Option<Vec<BlockSummary>>, ReadError> {
         let path = joined(&self.group, &format!("{FOLDER}/{side}"));
-        if !self.has_own_samples || Node::read(&self.store, &path)?.is_none() {
+        let is_finest = self.facts.choices.iter().all(|choice| choice.read == 0);
+        if !self.is_packed || !is_finest || Node::read(&self.store, &path)?.is_none() {
+            return Ok(None);
+        }
+        if !self.is_as_packed()? {
+            if !self.facts.notes.contains(&Note::ChangedStore) {
+                self.facts.notes.push(Note::ChangedStore);
+            }
             return Ok(None);
         }
         let n = BlockLayout::new(self.facts.grid.dims(), side).n_blocks();
@@ -298,6 +295,14 @@ impl ZarrLevels {
         guarded("Zarr", || self.read_summaries(&parts, n.z)).map(Some)
     }
 
+    /// Whether the samples of a packed store, whose finest level was asked for, are those that were packed.
+    fn is_as_packed(&self) -> Result<bool, ReadError> {
+        let stated = Node::read(&self.store, &self.group)?.and_then(|node| node.stated_digest());
+        let shards: Vec<_> = self.levels.iter().map(|level| level.parts.chunk_keys()).collect();
+        let found = digest(&*self.store, &shards).map_err(|e| ReadError::decoder("the digest of the store", e))?;
+        Ok(stated == Some(found.into()))
+    }
+
     fn read_summaries(&self, parts: &Parts, n_layers: u32) -> Result<Vec<BlockSummary>, ReadError> {
         let mut summaries = Vec::new();
         for z in 0..n_layers {
@@ -312,14 +317,6 @@ impl ZarrLevels {
         }
         Ok(summaries)
     }
-}
-
-/// Whether the samples of a packed store are those that were packed.
-fn is_as_packed(store: &ReadableStorage, group: &str, levels: &[LevelArray]) -> Result<bool, ReadError> {
-    let stated = Node::read(store, group)?.and_then(|node| node.stated_digest());
-    let shards: Vec<_> = levels.iter().map(|level| level.parts.chunk_keys()).collect();
-    let found = digest(&**store, &shards).map_err(|e| ReadError::decoder("the digest of the store", e))?;
-    Ok(stated == Some(found.into()))
 }
 
 impl LevelArray {
