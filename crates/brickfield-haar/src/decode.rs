@@ -65,8 +65,8 @@ pub fn decode<T: Sample>(brick: &[u8]) -> Result<Decoded<T>, DecodeError> {
     level_of(&whole_brick(brick)?, brick, Level(0), None)
 }
 
-/// Decodes all samples of a brick with [`LowBand::Elsewhere`], given its low band: level [`BrickHeader::n_levels`], x fastest. A brick
-/// that needs none, such as one of one value, leaves it out of account.
+/// Decodes all samples of a brick with [`LowBand::Elsewhere`], given the samples of level 1, x fastest: means rounded to the nearest. A
+/// brick that needs none, such as one of one value, leaves it out of account.
 ///
 /// # Errors
 /// As for [`decode`], and if the low band has another number of samples.
@@ -178,6 +178,7 @@ fn band_level<T: Sample>(
         decode_section(&mut bands, header.body, of_level, section).map_err(|_| DecodeError::Section { section: i })?;
     }
     let values = match header.has_bands() {
+        true if is_elsewhere => bands.without_means().into_level(level),
         true => bands.into_level(level),
         false => averages(header.extent, bands.into_level(Level(0)), level),
     };

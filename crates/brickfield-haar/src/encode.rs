@@ -19,7 +19,8 @@ pub struct EncodeOptions {
     pub kernels: Vec<Kernel>,
     /// The storages that may be used.
     pub storages: Storages,
-    /// Levels above level 0 that are stored apart, or `None` for as many as leave at most 4 samples along each axis.
+    /// Levels above level 0 that are stored apart, or `None` for as many as leave at most 4 samples along each axis; 1 with
+    /// [`LowBand::Elsewhere`].
     pub n_levels: Option<u8>,
     /// What may be lost.
     pub loss: Loss,
@@ -32,7 +33,8 @@ pub struct EncodeOptions {
 pub enum LowBand {
     /// In the brick.
     Stored,
-    /// Not in the brick: it is the next level, which is stored elsewhere, and [`decode_with_low`](crate::decode_with_low) is given it.
+    /// Not in the brick: level 1 is stored elsewhere, and [`decode_with_low`](crate::decode_with_low) is given it. Its samples are those of
+    /// an ordinary pyramid: the mean of each 2 x 2 x 2 samples, fewer at the upper ends, rounded to the nearest, halves up.
     Elsewhere,
 }
 
@@ -92,8 +94,8 @@ pub enum EncodeError {
         "the low band of the kernel {kernel} cannot be stored elsewhere; only those of haar and haar-predicted can"
     )]
     NoLowBand { kernel: Kernel },
-    #[error("a brick of 0 levels has no low band that could be stored elsewhere; at least 1 is needed")]
-    NoLevels,
+    #[error("{given} levels above a brick whose level 1 is stored elsewhere; it must be 1")]
+    LevelsBelowMeans { given: u8 },
     #[error("a low band can be stored elsewhere only if nothing is lost, but {loss:?} is asked for")]
     LossyLowBand { loss: Loss },
 }
@@ -142,7 +144,7 @@ fn check_low_band(options: &EncodeOptions, n_levels: u8) -> Result<(), EncodeErr
     let is_other = |kernel: &&Kernel| !matches!(kernel, Kernel::Haar | Kernel::HaarPredicted);
     match options.kernels.iter().find(is_other) {
         Some(&kernel) => Err(EncodeError::NoLowBand { kernel }),
-        None if n_levels == 0 => Err(EncodeError::NoLevels),
+        None if n_levels != 1 => Err(EncodeError::LevelsBelowMeans { given: n_levels }),
         None if options.loss != Loss::None => Err(EncodeError::LossyLowBand { loss: options.loss }),
         None => Ok(()),
     }
@@ -152,6 +154,7 @@ fn n_levels(options: &EncodeOptions, extent: UVec3) -> Result<u8, EncodeError> {
     match options.n_levels {
         Some(given) if given > MAX_LEVELS => Err(EncodeError::Levels { given }),
         Some(n_levels) => Ok(n_levels),
+        None if options.low_band == LowBand::Elsewhere => Ok(1),
         None => Ok((0..MAX_LEVELS).find(|&l| Level(l).dims_of(extent).max_element() <= 4).unwrap_or(MAX_LEVELS)),
     }
 }
@@ -176,7 +179,10 @@ fn best_candidate<C: crate::Coefficient>(
 ) -> Candidate<C> {
     let of_kernel = |&kernel: &Kernel| {
         let n_levels = if kernel.has_bands() { n_levels } else { 0 };
-        let mut bands = Bands::of(kernel, extent, values.to_vec(), n_levels);
+        let mut bands = match options.low_band {
+            LowBand::Stored => Bands::of(kernel, extent, values.to_vec(), n_levels),
+            LowBand::Elsewhere => Bands::below_means(kernel, extent, values.to_vec()),
+        };
         if let Loss::Threshold(bound) = options.loss {
             bands.threshold(u64::from(bound));
         }

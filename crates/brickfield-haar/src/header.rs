@@ -103,6 +103,9 @@ impl BrickHeader {
                 self.body = Body::Packed;
             }
         }
+        if self.low_band() == LowBand::Elsewhere && self.n_levels != 1 {
+            return Err(DecodeError::Field { field: "the number of levels below a low band elsewhere" });
+        }
         if self.storage == Storage::Coded {
             let model = Model::from_bytes(fields.take(N_MODEL_BYTES)?);
             self.body = Body::Coded(model.ok_or(DecodeError::Field { field: "a table of the model" })?);

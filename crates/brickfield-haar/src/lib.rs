@@ -9,6 +9,7 @@ mod extent;
 mod frequencies;
 mod header;
 mod kernel;
+mod means;
 mod median;
 mod packed;
 mod parallel;

@@ -5,6 +5,7 @@ use brickfield_core::glam::UVec3;
 
 use crate::extent::{BandBox, ExtentError, MAX_LEVELS, n_samples};
 use crate::kernel::{Kernel, lift, unlift};
+use crate::means;
 use crate::sample::{Coefficient, Sample};
 
 /// A brick as a low band and seven detail bands for each level below it.
@@ -76,6 +77,22 @@ impl<C: Coefficient> Bands<C> {
             details.push(transformed);
         }
         Bands { kernel, extent, details, low }
+    }
+
+    /// The details of a brick whose low band is stored elsewhere: the means of its cells.
+    pub(crate) fn below_means(kernel: Kernel, extent: UVec3, values: Vec<C>) -> Bands<C> {
+        let means = means::means(extent, &values);
+        let mut bands = Bands { kernel, ..Bands::of(Kernel::Haar, extent, values, 1) };
+        means::change_by_predictions(kernel, extent, &mut bands.details[0], &means, C::minus);
+        bands
+    }
+
+    /// The bands of the Haar kernel of those that are [`below_means`](Self::below_means), whose low band is the means.
+    pub(crate) fn without_means(self) -> Bands<C> {
+        let Bands { kernel, extent, mut details, low: means } = self;
+        means::change_by_predictions(kernel, extent, &mut details[0], &means, C::plus);
+        let low = means::low_of(extent, &means, &details[0]);
+        Bands { kernel: Kernel::Haar, extent, details, low }
     }
 
     /// Bands that are all 0.
