@@ -15,7 +15,7 @@ use crate::spawn::{metadata, root};
 const ALLOWED: &[(&str, &[&str])] = &[
     ("brickfield-core", &[]),
     ("brickfield-optics", &["core"]),
-    ("brickfield-io", &["core", "optics"]),
+    ("brickfield-io", &["core", "optics", "haar"]),
     ("brickfield-bricks", &["core", "optics"]),
     ("brickfield-lod", &["core", "optics"]),
     ("brickfield-interp", &["core", "optics"]),

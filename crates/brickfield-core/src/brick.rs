@@ -8,7 +8,7 @@ use glam::UVec3;
 use crate::BrickLayout;
 
 /// A resolution level: 0 is the finest, each level up halves the resolution.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Level(pub u8);
 
 impl Level {

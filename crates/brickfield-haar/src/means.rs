@@ -79,7 +79,11 @@ impl Differences {
         let stride = [1, self.n.x as isize, (self.n.x * self.n.y) as isize][axis];
         let (has_before, has_behind) = (cell > 0, cell + 1 < self.n[axis]);
         let (before, behind) = (if has_before { -stride } else { 0 }, if has_behind { stride } else { 0 });
-        (has_before || has_behind).then_some(Difference { before, behind, bits: 1 + u32::from(has_before && has_behind) })
+        (has_before || has_behind).then_some(Difference {
+            before,
+            behind,
+            bits: 1 + u32::from(has_before && has_behind),
+        })
     }
 
     /// Changes each detail of a row of the band by its prediction, if it has one.
@@ -108,9 +112,7 @@ impl Differences {
             let cell = first + x as isize;
             let prediction = match (of_x, self.along(0, x as u32)) {
                 (false, _) => rounded(across_at(cell), bits),
-                (true, Some(d)) => {
-                    rounded(across_at(cell + d.before).minus(across_at(cell + d.behind)), bits + d.bits)
-                }
+                (true, Some(d)) => rounded(across_at(cell + d.before).minus(across_at(cell + d.behind)), bits + d.bits),
                 (true, None) => return,
             };
             *detail = change(*detail, prediction);

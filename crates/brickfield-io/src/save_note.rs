@@ -33,6 +33,10 @@ pub enum SaveNote {
     SamplesAlone { spec: String },
     /// OME-Zarr has no words for the direction of axes; it is stated in an attribute of our own.
     DirectionOwn,
+    /// OME-Zarr has no words for slope and intercept: samples are stored numbers, and both are stated in attributes of our own.
+    RescaleOwn,
+    /// Level 0 is stored as details of level 1: programs without the codec open levels 1 and coarser.
+    DetailsOwn,
     /// NIfTI-2 was written, which many programs do not open.
     Nifti2 { reason: String },
 }
@@ -97,6 +101,14 @@ impl fmt::Display for SaveNote {
             SaveNote::DirectionOwn => f.write_str(
                 "the axes of the volume are not those of the world; OME-Zarr has no words for that: brickfield reads the \
                  direction from an attribute of its own, and other programs show the volume along its own axes",
+            ),
+            SaveNote::RescaleOwn => f.write_str(
+                "samples are the stored numbers, not the values; OME-Zarr has no words for slope and intercept: brickfield \
+                 reads both from an attribute of its own, and other programs show the stored numbers",
+            ),
+            SaveNote::DetailsOwn => f.write_str(
+                "level 0 is stored as details of level 1, which take the codec brickfield.haar_details; other programs open \
+                 levels 1 and coarser",
             ),
             SaveNote::Nifti2 { reason } => {
                 write!(f, "the file is NIfTI-2, which many programs do not open, for {reason}")

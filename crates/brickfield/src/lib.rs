@@ -39,7 +39,7 @@ pub use brickfield_lod as lod;
 pub use brickfield_optics as optics;
 pub use brickfield_trim as trim;
 #[cfg(feature = "formats")]
-pub use pack::{PackError, PackProgress, Packed, pack};
+pub use pack::{Codec, PackError, PackProgress, Packed, pack};
 pub use picture::{PictureError, PictureFormat, check_picture_path, srgb8, write_exr, write_picture, write_png};
 pub use prepare::{MAX_FACETS, MAX_IMAGE, MAX_POLYGONS, MAX_SEGMENTS, PrepareError, prepare, prepare_selection};
 pub use residency::{Copied, Residency};

@@ -4,11 +4,38 @@ use std::path::{Path, PathBuf};
 
 use brickfield_bricks::{Pyramid, SliceError, block_summaries, coarsest_level};
 use brickfield_core::{BlockSide, Level, NonFinite, Rescale, Scalar, ScalarType, ValueRange, Voxels, with_voxels};
-use brickfield_io::ome_zarr::PyramidWriter;
-use brickfield_io::{Format, Note, OpenError, SaveError, SaveNote, SaveOptions, SliceSource, VolumeFacts};
+use brickfield_io::ome_zarr::{Finest, PyramidOptions, PyramidWriter};
+use brickfield_io::{Compression, Format, Note, OpenError, SaveError, SaveNote, SaveOptions, SliceSource, VolumeFacts};
 
 /// Slices that are in memory at once: a layer of chunks, and of the largest blocks.
 const SLAB_SLICES: u32 = 32;
+
+/// How the samples of a store are coded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Codec {
+    /// Not at all.
+    None,
+    /// zstd: every program opens all levels.
+    #[default]
+    Zstd,
+    /// Level 0 as details of level 1 (Saladi, Pinnamaneni and Meyer 2003), the other levels by zstd: the least bytes, and other programs
+    /// open levels 1 and coarser. Of integers only; the store has the stored numbers, and slope and intercept in an attribute of our own.
+    Haar,
+}
+
+impl Codec {
+    /// All codecs.
+    pub const ALL: [Codec; 3] = [Codec::None, Codec::Zstd, Codec::Haar];
+
+    /// The name on command lines.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Codec::None => "none",
+            Codec::Zstd => "zstd",
+            Codec::Haar => "haar",
+        }
+    }
+}
 
 /// A volume that was packed.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,6 +73,8 @@ pub enum PackError {
     NotZarr { path: PathBuf, format: Format },
     #[error("{}: the store would lie inside of {}, which is packed", path.display(), input.display())]
     IntoInput { path: PathBuf, input: PathBuf },
+    #[error("{}: samples are {scalar}; the codec haar is for integers: take zstd", path.display())]
+    Floats { path: PathBuf, scalar: ScalarType },
     #[error("{}: {fault}", path.display())]
     Slices { path: PathBuf, fault: SliceError },
     #[error("{}: values rescaled by slope {} and intercept {} reach from {} to {}; they must be finite", path.display(), rescale.slope(), rescale.intercept(), range.min, range.max)]
@@ -55,27 +84,31 @@ pub enum PackError {
 /// Packs a volume as OME-Zarr 0.5, with averages of all levels and summaries of blocks: see [`PyramidWriter`].
 ///
 /// `open` opens the slices of the volume at `path`; it is called twice for floats, which may not be finite, and for rescaled
-/// volumes, whose type depends on their values: a store has values, in f32 if that holds all of them exactly, else in f64. `options.frame`
-/// and `options.unit` are those of the volume.
+/// volumes, whose type depends on their values: a store has values, in f32 if that holds all of them exactly, else in f64. With
+/// [`Codec::Haar`] it has the stored numbers.
 ///
 /// Memory: 32 slices of the volume as they are read and as they are stored; 32 slices of each level, 1/3 of that; sums of 8/3 bytes for each voxel of a
 /// slice; two copies of a shard of 32 x 512 x 512 samples.
 ///
 /// # Errors
-/// What the reader says; a store that is there already or cannot be written to.
+/// What the reader says; a store that is there already or cannot be written to; floats for [`Codec::Haar`].
 pub fn pack(
     path: &Path,
     open: &mut dyn FnMut() -> Result<Box<dyn SliceSource>, OpenError>,
     store: &Path,
-    options: &SaveOptions,
+    codec: Codec,
     progress: &mut dyn FnMut(PackProgress),
 ) -> Result<Packed, PackError> {
     check_store_path(path, store)?;
     let mut source = open()?;
     let facts = source.facts().clone();
     let dims = facts.grid.dims();
-    let has_two_passes =
-        matches!(facts.scalar, ScalarType::F32 | ScalarType::F64) || facts.rescale != Rescale::IDENTITY;
+    let is_float = matches!(facts.scalar, ScalarType::F32 | ScalarType::F64);
+    if codec == Codec::Haar && is_float {
+        return Err(PackError::Floats { path: path.to_owned(), scalar: facts.scalar });
+    }
+    let options = options_of(&facts, codec);
+    let has_two_passes = is_float || facts.rescale != options.rescale;
     let n_total = u64::from(dims.z) * if has_two_passes { 2 } else { 1 };
     let mut n_done = 0;
     let mut told = |n: u64| {
@@ -85,18 +118,16 @@ pub fn pack(
     let survey = match has_two_passes {
         true => {
             // A path that is taken is refused before the first pass, too.
-            drop(PyramidWriter::create(store, &facts.grid, facts.scalar, Level(0), options)?);
+            drop(PyramidWriter::create(store, &facts.grid, facts.scalar, &options)?);
             let survey = Survey::of(path, &mut *source, &mut told)?;
             source = open()?;
             survey
         }
         false => Survey::default(),
     };
-    let values = Values::new(path, &facts, &survey)?;
-    let coarsest = coarsest_level(dims);
-    let mut options = options.clone();
-    (options.frame, options.unit) = (facts.frame, facts.unit.clone());
-    let writer = PyramidWriter::create(store, &facts.grid, values.scalar, coarsest, &options)?;
+    let values = Values::new(path, &facts, options.rescale, &survey)?;
+    let coarsest = options.coarsest;
+    let writer = PyramidWriter::create(store, &facts.grid, values.scalar, &options)?;
     let mut notes = writer.notes();
     if values.scalar != facts.scalar {
         notes.push(SaveNote::ValuesStored { format: Format::OmeZarr, from: facts.scalar, to: values.scalar });
@@ -105,6 +136,21 @@ pub fn pack(
     let mut facts = VolumeFacts { notes: source.facts().notes.clone(), ..facts };
     facts.notes.extend(values.note(survey.non_finite));
     Ok(Packed { facts, scalar: values.scalar, coarsest, notes })
+}
+
+/// The store of a volume.
+fn options_of(facts: &VolumeFacts, codec: Codec) -> PyramidOptions {
+    let mut save = SaveOptions::default();
+    (save.frame, save.unit) = (facts.frame, facts.unit.clone());
+    save.compression = if codec == Codec::None { Compression::None } else { Compression::Lossless };
+    let coarsest = coarsest_level(facts.grid.dims());
+    match codec {
+        // A volume of one sample has a level 1, too.
+        Codec::Haar => {
+            PyramidOptions { save, coarsest: coarsest.max(Level(1)), finest: Finest::Details, rescale: facts.rescale }
+        }
+        _ => PyramidOptions { save, coarsest, ..PyramidOptions::default() },
+    }
 }
 
 /// Refuses names of other formats, and places inside of what is packed.
@@ -146,7 +192,7 @@ fn write(
         let (slab, n_slices) = next_slab(path, source)?;
         let slab = values.of(slab);
         for side in BlockSide::ALL {
-            let summaries = block_summaries(&slab, dims.with_z(n_slices), side, Rescale::IDENTITY).map_err(fault)?;
+            let summaries = block_summaries(&slab, dims.with_z(n_slices), side, values.stated).map_err(fault)?;
             writer.push_summaries(side, &summaries)?;
         }
         let mut coarser = Vec::new();
@@ -221,24 +267,24 @@ impl Survey {
 /// How stored numbers become samples of the store.
 struct Values {
     scalar: ScalarType,
+    /// From stored numbers to samples.
     rescale: Rescale,
+    /// From samples to values: what the store states.
+    stated: Rescale,
     /// Least and greatest finite number, if there are others.
     finite: Option<ValueRange>,
 }
 
 impl Values {
-    fn new(path: &Path, facts: &VolumeFacts, survey: &Survey) -> Result<Values, PackError> {
-        let rescale = facts.rescale;
-        let range = rescale.values(survey.finite_or_zero());
-        if !(range.min.is_finite() && range.max.is_finite()) {
-            return Err(PackError::BeyondFinite { path: path.to_owned(), rescale, range });
+    fn new(path: &Path, facts: &VolumeFacts, stated: Rescale, survey: &Survey) -> Result<Values, PackError> {
+        if stated == facts.rescale {
+            check_finite(path, stated, INTEGERS)?;
+            return Ok(Values { scalar: facts.scalar, rescale: Rescale::IDENTITY, stated, finite: survey.finite() });
         }
-        let scalar = match rescale == Rescale::IDENTITY {
-            true => facts.scalar,
-            false if survey.n_inexact == 0 => ScalarType::F32,
-            false => ScalarType::F64,
-        };
-        Ok(Values { scalar, rescale, finite: survey.finite() })
+        let rescale = facts.rescale;
+        check_finite(path, rescale, survey.finite_or_zero())?;
+        let scalar = if survey.n_inexact == 0 { ScalarType::F32 } else { ScalarType::F64 };
+        Ok(Values { scalar, rescale, stated, finite: survey.finite() })
     }
 
     /// The samples of stored numbers.
@@ -263,6 +309,17 @@ impl Values {
     fn note(&self, counts: NonFinite) -> Option<Note> {
         let ValueRange { min, max } = self.finite?;
         Some(Note::NonFinite { counts, low: self.rescale.value(min), high: self.rescale.value(max) })
+    }
+}
+
+/// The range of all integers that are samples.
+const INTEGERS: ValueRange = ValueRange { min: i32::MIN as f64, max: u32::MAX as f64 };
+
+fn check_finite(path: &Path, rescale: Rescale, stored: ValueRange) -> Result<(), PackError> {
+    let range = rescale.values(stored);
+    match range.min.is_finite() && range.max.is_finite() {
+        true => Ok(()),
+        false => Err(PackError::BeyondFinite { path: path.to_owned(), rescale, range }),
     }
 }
 

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use brickfield::bricks::{BlockOptions, BlockSource, BlockVolume, build_blocks, fetch_values};
 use brickfield::core::glam::{DMat3, DVec3, UVec3};
 use brickfield::core::{BlockSide, Grid, Level, Rescale, Scalar, ScalarType, ValueRange, Volume, Voxels};
-use brickfield::io::{Compression, Note, OpenOptions, SaveNote, SaveOptions, open, open_slices, save};
-use brickfield::{PackProgress, Packed, StoreBlocks, StoreLimits, pack};
+use brickfield::io::{Note, OpenOptions, SaveNote, SaveOptions, open, open_slices, save};
+use brickfield::{Codec, PackError, PackProgress, Packed, StoreBlocks, StoreLimits, pack};
 
 fn grid(dims: UVec3) -> Grid {
     Grid::from_first_sample(dims, DVec3::new(0.5, 1.0, 3.0), DVec3::new(7.0, -8.0, 9.0), DMat3::IDENTITY).unwrap()
@@ -41,14 +41,16 @@ fn blocks(volume: &Volume, side: BlockSide) -> BlockVolume {
 
 /// Saves a volume and packs it.
 fn packed(folder: &Path, volume: &Volume, end: &str) -> Packed {
+    packed_by(Codec::Zstd, folder, volume, end)
+}
+
+fn packed_by(codec: Codec, folder: &Path, volume: &Volume, end: &str) -> Packed {
     let file = folder.join(format!("volume.{end}"));
     save(&file, volume, &SaveOptions::default()).unwrap();
-    let mut options = SaveOptions::default();
-    options.compression = Compression::Lossless;
     let mut last = None;
     let mut told = |p: PackProgress| last = Some(p);
     let mut opened = || open_slices(&file, &OpenOptions::default());
-    let packed = pack(&file, &mut opened, &folder.join("store.zarr"), &options, &mut told).unwrap();
+    let packed = pack(&file, &mut opened, &folder.join("store.zarr"), codec, &mut told).unwrap();
     assert!(last.is_some_and(|p| p.n_done == p.n_total && p.n_total > 0));
     packed
 }
@@ -91,6 +93,38 @@ fn a_packed_store_has_the_blocks_of_the_volume() {
         let opened = open(&folder.path().join("store.zarr"), &OpenOptions::default()).unwrap();
         assert_eq!(opened.volume.voxels(), volume.voxels());
     }
+}
+
+/// Details and level 1 make the same blocks as arrays of both.
+#[test]
+fn a_store_of_details_has_the_blocks_of_the_volume() {
+    let rescale = Rescale::new(0.5, -1024.0).unwrap();
+    for (scalar, rescale) in [(ScalarType::U8, rescale), (ScalarType::I16, Rescale::IDENTITY)] {
+        let folder = tempfile::tempdir().unwrap();
+        let volume = Volume::rescaled(grid(DIMS), noise(DIMS, scalar), rescale).unwrap();
+        let packed = packed_by(Codec::Haar, folder.path(), &volume, "nii");
+        assert_eq!(packed.scalar, scalar);
+        assert!(packed.notes.contains(&SaveNote::DetailsOwn), "{:?}", packed.notes);
+        for side in BlockSide::ALL {
+            let found = store(folder.path(), side);
+            assert_same(&found, &blocks(&volume, side), 0.0);
+            assert_eq!((found.rescale(), found.range()), (rescale, volume.range()));
+        }
+        let opened = open(&folder.path().join("store.zarr"), &OpenOptions::default()).unwrap();
+        assert_eq!(opened.volume.voxels(), volume.voxels());
+    }
+}
+
+#[test]
+fn the_codec_of_integers_refuses_floats_before_it_begins() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a.nrrd");
+    save(&file, &Volume::new(grid(DIMS), noise(DIMS, ScalarType::F32)).unwrap(), &SaveOptions::default()).unwrap();
+    let mut opened = || open_slices(&file, &OpenOptions::default());
+    let out = folder.path().join("store.zarr");
+    let fault = pack(&file, &mut opened, &out, Codec::Haar, &mut |_| panic!("work was done")).unwrap_err();
+    assert!(matches!(fault, PackError::Floats { scalar: ScalarType::F32, .. }), "{fault}");
+    assert!(!out.exists());
 }
 
 #[test]
@@ -142,7 +176,7 @@ fn voxels_that_are_not_finite_are_replaced_as_in_a_volume() {
     fs::write(&raw, bytes).unwrap();
     let mut opened = || open_slices(&raw, &OpenOptions::default());
     let store_path = folder.path().join("store.zarr");
-    let packed = pack(&raw, &mut opened, &store_path, &SaveOptions::default(), &mut |_| {}).unwrap();
+    let packed = pack(&raw, &mut opened, &store_path, Codec::Zstd, &mut |_| {}).unwrap();
     let counts = volume.non_finite();
     assert_eq!(packed.facts.notes, [Note::NonFinite { counts, low: 0.0, high: 999.0 }]);
     assert_same(&store(folder.path(), BlockSide::V16), &blocks(&volume, BlockSide::V16), 0.0);
@@ -336,7 +370,7 @@ fn a_store_that_is_there_is_not_touched() {
     save(&file, &Volume::new(grid(DIMS), noise(DIMS, ScalarType::F32)).unwrap(), &SaveOptions::default()).unwrap();
     let mut opened = || open_slices(&file, &OpenOptions::default());
     let mut told = |_| panic!("work was done");
-    let fault = pack(&file, &mut opened, folder.path(), &SaveOptions::default(), &mut told).unwrap_err();
+    let fault = pack(&file, &mut opened, folder.path(), Codec::Zstd, &mut told).unwrap_err();
     assert!(fault.to_string().contains("there is one already"), "{fault}");
     assert_eq!(folder.path().read_dir().unwrap().count(), 1);
 }

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
-use brickfield::PackProgress;
 use brickfield::options::{progress_bar, values};
+use brickfield::{Codec, PackProgress};
 use brickfield_conformance::volumes::pack_phantom;
 use clap::Parser;
 
@@ -18,16 +18,19 @@ struct Arguments {
     /// OME-Zarr to write: a folder that is not there yet
     #[arg(short, long, value_name = "STORE")]
     out: PathBuf,
+    /// How samples are coded: zstd, haar (integers) or none
+    #[arg(long, value_name = "CODEC", default_value = "zstd", value_parser = values::codec)]
+    codec: Codec,
 }
 
 fn main() -> Result<ExitCode> {
-    let Arguments { volume, out } = Arguments::parse();
+    let Arguments { volume, out, codec } = Arguments::parse();
     let bar = progress_bar("packing the phantom");
     let mut told = |p: PackProgress| {
         bar.set_length(p.n_total);
         bar.set_position(p.n_done);
     };
-    let packed = pack_phantom(volume.dims, volume.scalar, &out, &mut told);
+    let packed = pack_phantom(volume.dims, volume.scalar, codec, &out, &mut told);
     bar.finish_and_clear();
     let packed = packed?;
     println!("{}: {} voxels of {}, levels 0 to {}", out.display(), volume.dims, packed.scalar, packed.coarsest.0);

@@ -10,7 +10,7 @@ use brickfield::lod::{
     BlockBudget, BlockErrors, BlockSelection, BudgetSize, OneSampleBlocks, Slab, select_block_levels,
 };
 use brickfield::optics::automatic;
-use brickfield::{BlockResidency, Scene, StoreBlocks, StoreLimits, Viewpoint, prepare_blocks};
+use brickfield::{BlockResidency, Codec, Scene, StoreBlocks, StoreLimits, Viewpoint, prepare_blocks};
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, Grid, Image, Interblock, Level, ScalarType, TransferFunction};
 use serde::Serialize;
@@ -71,7 +71,7 @@ fn stored(args: &LjungArgs) -> Result<PathBuf, PaperError> {
         return Ok(path);
     }
     memory::restart_peak();
-    pack_phantom(dims, ScalarType::U8, &path, &mut |_| ())?;
+    pack_phantom(dims, ScalarType::U8, Codec::Zstd, &path, &mut |_| ())?;
     let (n_bytes, peak) = (dims.as_u64vec3().element_product(), peak_text(memory::peak()));
     print(&format!("packed {:.0} MiB of voxels as {}; {peak}", mib(n_bytes), path.display()))?;
     Ok(path)

@@ -6,8 +6,8 @@
 
 use std::path::Path;
 
-use brickfield::io::{Compression, Format, ReadError, SaveOptions, SliceSource, VolumeFacts, WorldFrame};
-use brickfield::{PackError, PackProgress, Packed, pack};
+use brickfield::io::{Format, ReadError, SliceSource, VolumeFacts, WorldFrame};
+use brickfield::{Codec, PackError, PackProgress, Packed, pack};
 use brickfield_core::glam::{DMat3, DVec3, UVec3};
 use brickfield_core::{
     Camera, CameraError, Grid, Knot, Projection, Rescale, ScalarType, TransferFunction, Volume, Voxels,
@@ -100,13 +100,12 @@ impl SliceSource for PhantomSlices {
 pub fn pack_phantom(
     dims: UVec3,
     scalar: ScalarType,
+    codec: Codec,
     out: &Path,
     told: &mut dyn FnMut(PackProgress),
 ) -> Result<Packed, PackError> {
-    let mut options = SaveOptions::default();
-    options.compression = Compression::Lossless;
     let mut slices = || Ok(Box::new(PhantomSlices::new(dims, scalar)) as _);
-    pack(Path::new("the phantom"), &mut slices, out, &options, told)
+    pack(Path::new("the phantom"), &mut slices, out, codec, told)
 }
 
 /// Extinction per millimetre and colour of the phantom's tissues.

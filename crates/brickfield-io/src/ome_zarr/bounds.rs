@@ -7,6 +7,7 @@ use std::io::{self, Read};
 use serde_json::Value;
 
 use super::json::numbers;
+use super::pack::DETAILS_CODEC;
 use crate::ReadError;
 use crate::deflate::damage;
 use crate::error::bytes;
@@ -19,6 +20,8 @@ pub(super) enum Compressor {
     Zlib,
     Zstd,
     Blosc,
+    /// Details of the next level ([`brickfield_haar`]).
+    HaarDetails,
 }
 
 /// The one compressor of some bytes, and the checksums in it and around it.
@@ -54,12 +57,18 @@ impl Compressor {
             "zlib" | "numcodecs.zlib" => Ok(Compressor::Zlib),
             "zstd" | "numcodecs.zstd" => Ok(Compressor::Zstd),
             "blosc" | "numcodecs.blosc" => Ok(Compressor::Blosc),
+            DETAILS_CODEC => Ok(Compressor::HaarDetails),
             _ => Err(ReadError::unsupported("compressor", name, "gzip, zlib, zstd and blosc are")),
         }
     }
 }
 
 impl Packing {
+    /// Whether the parts of shards are details, to which samples of the next level belong.
+    pub(super) fn has_details(&self) -> bool {
+        matches!(self, Packing::Shard(shard) if shard.codecs.compressor == Compressor::HaarDetails)
+    }
+
     pub(super) fn of_v2(array: &Value) -> Result<Packing, ReadError> {
         let mut filters = array["filters"].as_array().into_iter().flatten();
         if let Some(filter) = filters.next() {
@@ -178,7 +187,8 @@ pub(super) fn check_stream(codecs: Codecs, stored: &[u8], max_bytes: u64, what: 
     let stored = &stored[..n_packed as usize];
     let max_bytes = max_bytes.saturating_add(CHECKSUM_BYTES * codecs.n_inner_checksums);
     let unpacked = match codecs.compressor {
-        Compressor::None => return Ok(()),
+        // A brick's header states its samples, and is held to them before they are decoded.
+        Compressor::None | Compressor::HaarDetails => return Ok(()),
         Compressor::Gzip => n_unpacked(flate2::read::GzDecoder::new(stored), max_bytes),
         Compressor::Zlib => n_unpacked(flate2::read::ZlibDecoder::new(stored), max_bytes),
         Compressor::Zstd => {

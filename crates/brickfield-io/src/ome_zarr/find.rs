@@ -150,30 +150,36 @@ fn multiscale(
     found: &mut FileFacts,
 ) -> Result<Vec<ImageArray>, ReadError> {
     let multiscale = &node.multiscales()[chosen];
-    let datasets = multiscale["datasets"].as_array().map_or(&[][..], Vec::as_slice);
+    let datasets = datasets_of(node, multiscale);
     let level = found.choices.choose(ChoiceKind::Level, Entries::Numbered(datasets.len() as u64), 0)?.entry as usize;
     let n_levels = match depth {
         Depth::OneLevel => 1,
         Depth::AllCoarser => datasets.len().saturating_sub(level).max(1),
     };
     found.frame = node.frame().unwrap_or(found.frame);
-    (level..level + n_levels).map(|level| level_of(store, group, node, multiscale, level)).collect()
+    let level_of = |level| level_of(store, group, node, (multiscale, &datasets), level);
+    (level..level + n_levels).map(level_of).collect()
+}
+
+/// The datasets of an image, the finest first: details that refine the first one of OME-Zarr come before it.
+fn datasets_of<'a>(node: &'a Node, multiscale: &'a Value) -> Vec<&'a Value> {
+    node.details().into_iter().chain(multiscale["datasets"].as_array().into_iter().flatten()).collect()
 }
 
 fn level_of(
     store: &ReadableStorage,
     group: &str,
     node: &Node,
-    multiscale: &Value,
+    (multiscale, datasets): (&Value, &[&Value]),
     level: usize,
 ) -> Result<ImageArray, ReadError> {
-    let dataset = &multiscale["datasets"][level];
+    let dataset = *datasets.get(level).unwrap_or(&&Value::Null);
     let path = dataset["path"].as_str().ok_or(ReadError::Missing { field: "multiscales/datasets/path" })?;
     let path = joined(group, checked_path(path, "datasets/path")?);
     let array = ArrayMetadata::read(store, &path)?;
     let image = ZarrImage::of_multiscale(path, multiscale, dataset, node.ome())?;
-    let finest = ZarrImage::of_multiscale(String::new(), multiscale, &multiscale["datasets"][0], node.ome())?;
-    Ok((image.packed(node.is_packed()).turned(node.steps(), &finest), array))
+    let finest = ZarrImage::of_multiscale(String::new(), multiscale, datasets[0], node.ome())?;
+    Ok((image.in_group(node)?.turned(node.steps(), &finest), array))
 }
 
 fn plain_array(store: &ReadableStorage, path: String) -> Result<ImageArray, ReadError> {

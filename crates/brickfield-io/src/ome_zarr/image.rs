@@ -1,9 +1,11 @@
 //! An image of a store: its array, its axes, and where it lies.
 
+use brickfield_core::Rescale;
 use brickfield_core::glam::{DMat3, DVec3};
 use serde_json::Value;
 
 use super::axes::{Axis, VolumeAxes, choose_entries, volume_axes_by_name, volume_axes_of_array};
+use super::node::Node;
 use crate::error::counted;
 use crate::length_unit::common_unit;
 use crate::opened::FileFacts;
@@ -17,6 +19,8 @@ pub(super) struct ZarrImage {
     is_placed: bool,
     /// Whether all chunks are stored, for this crate packed them.
     pub(super) is_packed: bool,
+    /// What samples mean.
+    pub(super) rescale: Rescale,
     /// The direction of axes that are not those of the world.
     turn: Option<Turn>,
     axes: Vec<Axis>,
@@ -70,11 +74,22 @@ impl ZarrImage {
         }
         let (scale, translation) = (vec![1.0; axes.len()], vec![0.0; axes.len()]);
         let channel_names = Vec::new();
-        Ok(ZarrImage { path, is_placed: false, is_packed: false, turn: None, axes, scale, translation, channel_names })
+        Ok(ZarrImage {
+            path,
+            is_placed: false,
+            is_packed: false,
+            rescale: Rescale::IDENTITY,
+            turn: None,
+            axes,
+            scale,
+            translation,
+            channel_names,
+        })
     }
 
-    pub(super) fn packed(self, is_packed: bool) -> ZarrImage {
-        ZarrImage { is_packed, ..self }
+    /// The image with what its group says of it under keys of our own.
+    pub(super) fn in_group(self, group: &Node) -> Result<ZarrImage, ReadError> {
+        Ok(ZarrImage { is_packed: group.is_packed(), rescale: group.rescale()?, ..self })
     }
 
     /// The image with axes of these steps at the finest level, whose transformations are those of `finest`.

@@ -1,12 +1,13 @@
 //! The metadata of an array, read before `zarrs` acts on them.
 
 use brickfield_core::ScalarType;
-use serde_json::Value;
+use serde_json::{Value, json};
 use zarrs::storage::ReadableStorage;
 
 use super::bounds::Packing;
 use super::json::{numbers, read_json};
 use super::node::joined;
+use super::write::little_endian;
 use crate::error::counted;
 use crate::limits::check_bytes;
 use crate::stored_type::StoredType;
@@ -105,7 +106,12 @@ impl ArrayMetadata {
         let chunk_shape = numbers(&grid["configuration"], "chunk_shape")?;
         let packing = Packing::of_v3(&json["codecs"])?;
         let (shape, dimension_names) = (numbers(json, "shape")?, json["dimension_names"].clone());
-        Ok(ArrayMetadata { shape, chunk_shape, stored, packing, dimension_names, document: json.clone() })
+        let mut document = json.clone();
+        if packing.has_details() {
+            // `zarrs` finds chunks; it does not decode these.
+            document["codecs"][0]["configuration"]["codecs"] = json!([little_endian()]);
+        }
+        Ok(ArrayMetadata { shape, chunk_shape, stored, packing, dimension_names, document })
     }
 
     /// The metadata of an array whose chunks are the smallest parts that can be read alone: chunks, or parts of shards.

@@ -17,7 +17,7 @@ mod write;
 
 pub use levels::ZarrLevels;
 pub(crate) use levels::slices;
-pub use pack::PyramidWriter;
+pub use pack::{Finest, PyramidOptions, PyramidWriter};
 pub use write::save;
 
 use std::collections::BTreeMap;
@@ -80,9 +80,12 @@ fn read_from(
     let shape = CheckedShape::claim(dims, array.stored, &options.limits)?;
     let grid = image.placement(volume_axes, options.spacing.is_some(), &mut found).grid(shape.dims)?;
     array.check_chunks(&options.limits)?;
+    if array.packing.has_details() {
+        return levels::read_details(store, list, options);
+    }
     let part = Part { path: &image.path, volume_axes, entries: &entries, is_packed: image.is_packed };
     let (voxels, note) = chunks::read(store, part, &array, &shape)?;
     found.notes.extend(note);
     let voxels = shape.converted(voxels, &mut found.notes)?;
-    found.finish(grid, voxels)
+    found.finish_rescaled(grid, voxels, image.rescale)
 }

@@ -1,11 +1,12 @@
 //! The nodes of a store: groups and arrays, with their attributes.
 
+use brickfield_core::Rescale;
 use brickfield_core::glam::DMat3;
 use serde_json::Value;
 use zarrs::storage::{ListableStorageTraits, ReadableStorage, StorePrefix};
 
 use super::json::read_json;
-use super::pack::{STEPS_KEY, is_packed, stated_digest};
+use super::pack::{DETAILS_KEY, RESCALE_KEY, STEPS_KEY, is_packed, stated_digest};
 use crate::files::stays_within;
 use crate::{ReadError, WorldFrame};
 
@@ -57,6 +58,22 @@ impl Node {
     pub(super) fn steps(&self) -> Option<DMat3> {
         let columns: [[f64; 3]; 3] = serde_json::from_value(self.attributes[STEPS_KEY].clone()).ok()?;
         Some(DMat3::from_cols_array_2d(&columns))
+    }
+
+    /// What the samples mean, under a key of our own.
+    pub(super) fn rescale(&self) -> Result<Rescale, ReadError> {
+        let stated = &self.attributes[RESCALE_KEY];
+        if stated.is_null() {
+            return Ok(Rescale::IDENTITY);
+        }
+        let number = |key: &str| stated[key].as_f64().unwrap_or(f64::NAN);
+        Rescale::new(number("slope"), number("intercept"))
+            .map_err(|_| ReadError::field(RESCALE_KEY, stated, "a finite slope that is not 0 and a finite intercept"))
+    }
+
+    /// The dataset of level 0, if it is stored as details of the first dataset of OME-Zarr.
+    pub(super) fn details(&self) -> Option<&Value> {
+        Some(&self.attributes[DETAILS_KEY]).filter(|dataset| !dataset.is_null())
     }
 
     /// The names of an array's axes that Zarr v2 writers agreed upon.

@@ -1,5 +1,6 @@
 //! Writing OME-Zarr 0.5: one image at one level.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
 use std::{fs, io};
@@ -57,7 +58,10 @@ fn write(
     options: &SaveOptions,
 ) -> Result<ScalarType, Box<dyn std::error::Error + Send + Sync>> {
     fs::create_dir(folder)?;
-    fs::write(folder.join("zarr.json"), serde_json::to_vec_pretty(&group(volume.grid(), options, Level(0)))?)?;
+    fs::write(
+        folder.join("zarr.json"),
+        serde_json::to_vec_pretty(&group(volume.grid(), options, Level(0)..=Level(0)))?,
+    )?;
     let voxels = values(volume);
     let store: ReadableWritableListableStorage = Arc::new(FilesystemStore::new(folder)?);
     let metadata = serde_json::from_value(array(volume.grid(), voxels.scalar_type(), options.compression))?;
@@ -79,16 +83,17 @@ fn write(
     Ok(voxels.scalar_type())
 }
 
-/// The metadata of an image of levels 0 to `coarsest`, each of half as many samples along each axis as the one below, rounded up.
+/// The metadata of an image of some levels of a volume, each of half as many samples along each axis as the one below, rounded up.
 ///
 /// The samples of level l are means of 2^l voxels along each axis: the first one lies (2^l - 1) / 2 voxels after that of level 0.
-pub(super) fn group(grid: &Grid, options: &SaveOptions, coarsest: Level) -> Value {
+pub(super) fn group(grid: &Grid, options: &SaveOptions, levels: RangeInclusive<Level>) -> Value {
     let axis = |name: &str| match unit(options) {
         Some(unit) => json!({ "name": name, "type": "space", "unit": unit }),
         None => json!({ "name": name, "type": "space" }),
     };
     let axes = ["z", "y", "x"].map(axis);
-    let datasets: Vec<_> = (0..=coarsest.0).map(|l| dataset(grid, Level(l))).collect();
+    let levels = levels.start().0..=levels.end().0;
+    let datasets: Vec<_> = levels.map(|l| dataset(grid, Level(l), &l.to_string())).collect();
     let image = json!({ "axes": axes, "datasets": datasets });
     let mut attributes = json!({ "ome": { "version": "0.5", "multiscales": [image] } });
     // OME-Zarr 0.5 has no words for a frame; without any, readers have one of pictures.
@@ -102,7 +107,8 @@ pub(super) fn group(grid: &Grid, options: &SaveOptions, coarsest: Level) -> Valu
     })
 }
 
-fn dataset(grid: &Grid, level: Level) -> Value {
+/// The metadata of a level whose array has this path.
+pub(super) fn dataset(grid: &Grid, level: Level, path: &str) -> Value {
     let first_sample = grid.index_to_world().transform_point3(DVec3::splat(0.5));
     // Along a short axis there is one sample, of all voxels.
     let n_voxels = grid.dims().min(UVec3::splat(level.stride())).as_dvec3();
@@ -113,7 +119,7 @@ fn dataset(grid: &Grid, level: Level) -> Value {
         { "type": "scale", "scale": scale },
         { "type": "translation", "translation": translation }
     ]);
-    json!({ "path": level.0.to_string(), "coordinateTransformations": transformations })
+    json!({ "path": path, "coordinateTransformations": transformations })
 }
 
 /// The names of units of length (OME-Zarr 0.5, "axes" metadata).
@@ -156,7 +162,7 @@ fn unit(options: &SaveOptions) -> Option<&str> {
 fn array(grid: &Grid, scalar: ScalarType, compression: Compression) -> Value {
     let dims = grid.dims();
     let shape = [dims.z, dims.y, dims.x];
-    let mut codecs = vec![json!({ "name": "bytes", "configuration": { "endian": "little" } })];
+    let mut codecs = vec![little_endian()];
     if compression == Compression::Lossless {
         codecs.push(json!({ "name": "zstd", "configuration": { "level": 3, "checksum": false } }));
     }
@@ -172,6 +178,11 @@ fn array(grid: &Grid, scalar: ScalarType, compression: Compression) -> Value {
         "codecs": codecs,
         "dimension_names": ["z", "y", "x"]
     })
+}
+
+/// The codec of samples as they are.
+pub(super) fn little_endian() -> Value {
+    json!({ "name": "bytes", "configuration": { "endian": "little" } })
 }
 
 pub(super) fn data_type(scalar: ScalarType) -> &'static str {

@@ -3,6 +3,8 @@
 mod bad_input;
 mod common;
 mod damaged;
+#[cfg(feature = "ome-zarr")]
+mod details;
 #[cfg(feature = "dicom")]
 mod dicom;
 #[cfg(feature = "dicom")]
@@ -24,7 +26,6 @@ mod nrrd;
 mod nrrd_axes;
 #[cfg(feature = "ome-zarr")]
 mod ome_zarr;
-#[cfg(feature = "ome-zarr")]
 mod pack;
 #[cfg(any(feature = "tiff", feature = "png"))]
 mod pictures;

@@ -7,7 +7,7 @@ use brickfield_core::glam::{DMat3, DVec3, UVec3};
 use brickfield_core::{
     BlockLayout, BlockSide, BlockSummary, Grid, Level, N_BLOCK_BINS, ScalarType, ValueRange, Voxels,
 };
-use brickfield_io::ome_zarr::{PyramidWriter, ZarrLevels};
+use brickfield_io::ome_zarr::{PyramidOptions, PyramidWriter, ZarrLevels};
 use brickfield_io::{ByteOrder, ChoiceKind, Compression, OpenOptions, SaveError, SaveOptions, WorldFrame, open};
 
 use crate::common::*;
@@ -67,7 +67,8 @@ fn summaries(side: BlockSide) -> Vec<BlockSummary> {
 }
 
 fn create(path: &Path, grid: &Grid, scalar: ScalarType, options: &SaveOptions) -> Result<PyramidWriter, SaveError> {
-    PyramidWriter::create(path, grid, scalar, Level(N_LEVELS - 1), options)
+    let options = PyramidOptions { save: options.clone(), coarsest: Level(N_LEVELS - 1), ..PyramidOptions::default() };
+    PyramidWriter::create(path, grid, scalar, &options)
 }
 
 /// Writes all levels, `n_at_once` slices at a time.
@@ -331,8 +332,7 @@ fn slices_that_are_none_and_paths_that_are_taken_are_refused() {
         refused(create(&nowhere, &grid(DIMS), ScalarType::U8, &SaveOptions::default())).contains("there is no folder")
     );
     let dims = UVec3::new(3, 2, 1);
-    let mut writer =
-        PyramidWriter::create(&path, &grid(dims), ScalarType::U8, Level(0), &SaveOptions::default()).unwrap();
+    let mut writer = PyramidWriter::create(&path, &grid(dims), ScalarType::U8, &PyramidOptions::default()).unwrap();
     writer.push(Level(0), vec![1u8; 6].into()).unwrap();
     fs::create_dir(&path).unwrap();
     assert!(writer.finish().unwrap_err().to_string().contains("there is one already"));
@@ -347,7 +347,7 @@ fn levels_wider_than_a_shard_are_read_as_they_were_written() {
         let written: Vec<u16> =
             (0..dims.element_product()).map(|i| (i.wrapping_mul(2_654_435_761) >> 16) as u16).collect();
         let mut writer =
-            PyramidWriter::create(&path, &grid(dims), ScalarType::U16, Level(0), &SaveOptions::default()).unwrap();
+            PyramidWriter::create(&path, &grid(dims), ScalarType::U16, &PyramidOptions::default()).unwrap();
         writer.push(Level(0), written.clone().into()).unwrap();
         writer.finish().unwrap();
         assert_eq!(open(&path, &OpenOptions::default()).unwrap().volume.voxels(), &Voxels::from(written.clone()));

@@ -10,7 +10,7 @@ use brickfield_lod::Criterion;
 use brickfield_optics::{LightSource, LitSides, Normals, QuadratureRule};
 
 use super::{Background, Boxes};
-use crate::{Classification, MAX_IMAGE, Quality, TransparentBlocks};
+use crate::{Classification, Codec, MAX_IMAGE, Quality, TransparentBlocks};
 
 /// Pixels along a facet of tessellated shells where none are asked for.
 pub const FACET_PIXELS: u32 = 16;
@@ -97,6 +97,11 @@ pub fn lit_sides(text: &str) -> Result<LitSides, String> {
 /// Where normals come from.
 pub fn normals(text: &str) -> Result<Normals, String> {
     named(&[("central", Normals::Central), ("stored", Normals::Stored)], text)
+}
+
+/// How the samples of a store are coded.
+pub fn codec(text: &str) -> Result<Codec, String> {
+    named(&Codec::ALL.map(|codec| (codec.name(), codec)), text)
 }
 
 /// Draft or final.

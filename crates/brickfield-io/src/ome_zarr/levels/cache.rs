@@ -11,15 +11,26 @@ use super::parts::Kept;
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Key {
     pub(super) array: usize,
-    pub(super) is_index: bool,
+    pub(super) kind: Kind,
     pub(super) at: Vec<u64>,
+}
+
+/// What is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Kind {
+    /// Where the parts of a shard lie.
+    Index,
+    /// The samples of a part.
+    Samples,
+    /// The samples of a part that is stored as details: those of the next level are asked for meanwhile.
+    Refined,
 }
 
 pub(super) struct Cache {
     held: Mutex<Held>,
-    /// Whoever reads something holds its lock, so that nobody else reads it at the same time. Indices have locks of their own:
-    /// they are read by those who hold the lock of a part.
-    locks: [[Mutex<()>; N_LOCKS]; 2],
+    /// Whoever reads something holds its lock, so that nobody else reads it at the same time. Each kind has locks of its own, because
+    /// what is of one kind is read by those who hold the lock of another: refined samples, then samples, then an index.
+    locks: [[Mutex<()>; N_LOCKS]; 3],
     hasher: RandomState,
 }
 
@@ -47,7 +58,7 @@ impl Cache {
             return Ok(kept);
         }
         let lock = self.hasher.hash_one(&key) as usize % N_LOCKS;
-        let _only_here = locked(&self.locks[usize::from(key.is_index)][lock]);
+        let _only_here = locked(&self.locks[key.kind as usize][lock]);
         if let Some(kept) = locked(&self.held).get(&key) {
             return Ok(kept);
         }
@@ -95,7 +106,7 @@ mod tests {
     use std::sync::Arc;
 
     fn key(i: u64) -> Key {
-        Key { array: 0, is_index: false, at: vec![i] }
+        Key { array: 0, kind: Kind::Samples, at: vec![i] }
     }
 
     #[test]

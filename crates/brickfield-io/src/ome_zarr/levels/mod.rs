@@ -4,14 +4,16 @@ mod cache;
 mod parts;
 mod slices;
 
+pub(super) use slices::read_details;
 pub(crate) use slices::slices;
 
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use brickfield_core::Level;
 use brickfield_core::glam::{U64Vec3, UVec3};
-use brickfield_core::{BlockLayout, BlockSide, BlockSummary, Rescale, ScalarType, Voxels};
+use brickfield_core::{BlockLayout, BlockSide, BlockSummary, ScalarType, Voxels};
 use zarrs::filesystem::FilesystemStore;
 use zarrs::storage::{ListableStorageTraits, ReadableStorage};
 
@@ -24,7 +26,7 @@ use crate::guard::guarded;
 use crate::limits::{CheckedShape, check_bytes};
 use crate::opened::FileFacts;
 use crate::{Format, Limits, Note, OpenError, OpenOptions, ReadError, VolumeFacts};
-use cache::{Cache, Key};
+use cache::{Cache, Key, Kind};
 use parts::{Kept, Parts, ShardIndex, StoredPart};
 
 /// An OME-Zarr image at all its levels, of which boxes are read: the smallest parts of chunks or shards that hold them, and no more.
@@ -90,13 +92,14 @@ impl ZarrLevels {
         }
         let levels = images.iter().map(|level| LevelArray::new(&store, level, &images[0], volume_axes, &entries));
         let levels = levels.collect::<Result<Vec<_>, _>>()?;
+        check_details(&levels)?;
         for level in &levels {
             let what = || format!("a chunk of shape {:?}", level.parts.part_shape);
             check_bytes(level.parts.n_bytes(), &options.limits, what)?;
         }
         let group = image.path.rsplit_once('/').map_or("", |(group, _)| group).to_owned();
         Ok(ZarrLevels {
-            facts: found.described(grid, shape.scalar, Rescale::IDENTITY)?,
+            facts: found.described(grid, shape.scalar, image.rescale)?,
             levels,
             group,
             is_packed: image.is_packed,
@@ -221,15 +224,18 @@ impl ZarrLevels {
     /// The samples of a part; `None` if all are the fill value.
     fn samples(&self, level: usize, part: Vec<u64>) -> Result<Option<Arc<Vec<u8>>>, ReadError> {
         let parts = &self.levels[level].parts;
-        self.samples_of(parts, level, part)
-    }
-
-    fn samples_of(&self, parts: &Parts, array: usize, part: Vec<u64>) -> Result<Option<Arc<Vec<u8>>>, ReadError> {
-        let key = Key { array, is_index: false, at: part.clone() };
-        let kept = self.cache.get_or(key, || {
-            let index = self.index_of(parts, array, parts.chunk_of(&part))?;
+        let has_details = parts.has_details();
+        let kind = if has_details { Kind::Refined } else { Kind::Samples };
+        let kept = self.cache.get_or(Key { array: level, kind, at: part.clone() }, || {
+            let index = self.index_of(parts, level, parts.chunk_of(&part))?;
             match parts.stored(&part, index.as_deref(), &|n| self.count_bytes(n))? {
-                StoredPart::Bytes(stored) => Ok(Kept::Samples(Some(Arc::new(parts.unpacked(&part, stored)?)))),
+                StoredPart::Bytes(stored) => {
+                    let samples = match has_details {
+                        true => self.refined(level, &part, &stored)?,
+                        false => parts.unpacked(&part, stored)?,
+                    };
+                    Ok(Kept::Samples(Some(Arc::new(samples))))
+                }
                 StoredPart::Missing if self.is_packed => Err(ReadError::LostChunk { what: parts.named(&part) }),
                 StoredPart::Missing => {
                     self.n_missing.fetch_add(1, Ordering::Relaxed);
@@ -244,13 +250,24 @@ impl ZarrLevels {
         }
     }
 
+    /// The samples of a part that is stored as details of the next level.
+    fn refined(&self, level: usize, part: &[u64], stored: &[u8]) -> Result<Vec<u8>, ReadError> {
+        let array = &self.levels[level];
+        let side = U64Vec3::from(array.along_volume(&array.parts.part_shape)).as_uvec3();
+        let first = U64Vec3::from(array.along_volume(part)).as_uvec3() * side;
+        let extent = side.min(array.dims.saturating_sub(first));
+        let mut low = Vec::new();
+        self.read_box(level + 1, first / 2, Level(1).dims_of(extent), &mut low)?;
+        array.parts.refined(part, stored, extent, &low)
+    }
+
     /// The index of a shard; `None` if it is not there, or if chunks are no shards.
     fn index_of(&self, parts: &Parts, array: usize, at: Vec<u64>) -> Result<Option<Arc<ShardIndex>>, ReadError> {
         if !parts.is_sharded() {
             return Ok(None);
         }
         let read = |chunk: &[u64]| parts.index(chunk, &|n| self.count_bytes(n));
-        let kept = self.cache.get_or(Key { array, is_index: true, at: at.clone() }, || {
+        let kept = self.cache.get_or(Key { array, kind: Kind::Index, at: at.clone() }, || {
             Ok::<_, ReadError>(Kept::Index(read(&at)?.map(Arc::new)))
         })?;
         match kept {
@@ -397,6 +414,25 @@ fn copy_row(samples: &[u8], stride: u64, n_bytes: usize, out: &mut [u8]) {
             out.chunks_exact_mut(n_bytes).zip(column).for_each(|(o, s)| o.copy_from_slice(s));
         }
     }
+}
+
+/// Details are those of the finest level, along the axes of the volume alone, and refine a level of half as many samples.
+fn check_details(levels: &[LevelArray]) -> Result<(), ReadError> {
+    let fault = |found: String, expected: &str| Err(ReadError::field("level of details", found, expected));
+    for (i, level) in levels.iter().enumerate().filter(|(_, level)| level.parts.has_details()) {
+        let (n, is_even) = (level.parts.part_shape.len(), level.parts.part_shape.iter().all(|n| n.is_multiple_of(2)));
+        if i > 0 || n != 3 || !is_even || level.volume_axes != [Some(2), Some(1), Some(0)] {
+            return fault(format!("{i}, of {n} axes"), "0, with axes z, y, x and an even number of samples in chunks");
+        }
+        let next = levels.get(1).map(|next| (next.dims, next.parts.scalar()));
+        if next != Some((Level(1).dims_of(level.dims), level.parts.scalar())) {
+            return fault(
+                format!("of {} samples", level.dims),
+                "that of a level 1 of half as many along each axis, of their type",
+            );
+        }
+    }
+    Ok(())
 }
 
 fn dims_of(metadata: &ArrayMetadata, volume_axes: VolumeAxes) -> Result<UVec3, ReadError> {

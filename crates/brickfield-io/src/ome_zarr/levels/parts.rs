@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
+use brickfield_core::glam::UVec3;
 use brickfield_core::{Scalar, ScalarType};
+use brickfield_haar::Sample;
 use zarrs::array::codec::api::ArrayToBytesCodecTraits;
 use zarrs::array::{Array, ArrayBytesRaw, CodecOptions};
 use zarrs::storage::byte_range::ByteRange;
@@ -10,7 +12,7 @@ use zarrs::storage::{ReadableStorage, ReadableStorageTraits, StoreKey};
 
 use super::super::bounds::{Packing, Shard, check_stream};
 use super::super::metadata::ArrayMetadata;
-use super::super::pack::keys;
+use super::super::pack::{decode_details, keys};
 use crate::error::{bytes, check_length};
 use crate::numbers::{FileScalar, with_room};
 use crate::stored_type::StoredType;
@@ -101,6 +103,11 @@ impl Parts {
     /// Whether chunks are shards, and parts less than a chunk.
     pub(super) fn is_sharded(&self) -> bool {
         matches!(self.packing, Packing::Shard(_))
+    }
+
+    /// Whether parts are details of the next level.
+    pub(super) fn has_details(&self) -> bool {
+        self.packing.has_details()
     }
 
     /// Whether samples are 64-bit integers.
@@ -207,6 +214,42 @@ impl Parts {
             true => Ok(samples),
             false => Err(ReadError::TooFewSamples { what, found, expected }),
         }
+    }
+
+    /// The samples of a part that is stored as details, of which `extent` lie within the array: x fastest, little-endian, zeros behind them.
+    /// `low` are those of the next level, little-endian.
+    pub(super) fn refined(&self, part: &[u64], stored: &[u8], extent: UVec3, low: &[u8]) -> Result<Vec<u8>, ReadError> {
+        let what = format!("{} of {} stored", self.named(part), bytes(stored.len()));
+        match self.scalar() {
+            ScalarType::U8 => self.details::<u8, 1>(stored, extent, low, &what, u8::to_le_bytes),
+            ScalarType::I8 => self.details::<i8, 1>(stored, extent, low, &what, i8::to_le_bytes),
+            ScalarType::U16 => self.details::<u16, 2>(stored, extent, low, &what, u16::to_le_bytes),
+            ScalarType::I16 => self.details::<i16, 2>(stored, extent, low, &what, i16::to_le_bytes),
+            ScalarType::U32 => self.details::<u32, 4>(stored, extent, low, &what, u32::to_le_bytes),
+            ScalarType::I32 => self.details::<i32, 4>(stored, extent, low, &what, i32::to_le_bytes),
+            other @ (ScalarType::F32 | ScalarType::F64) => {
+                Err(ReadError::field(format!("type of array {:?}", self.path), other, "an integer type, for details"))
+            }
+        }
+    }
+
+    fn details<T: Sample + FileScalar, const N: usize>(
+        &self,
+        stored: &[u8],
+        extent: UVec3,
+        low: &[u8],
+        what: &str,
+        to_le_bytes: fn(T) -> [u8; N],
+    ) -> Result<Vec<u8>, ReadError> {
+        let samples = decode_details::<T>(stored, extent, low, what)?;
+        let [ny, nx] = [1, 2].map(|axis| self.part_shape[axis] as usize);
+        let mut all = vec![0; self.part_shape.iter().product::<u64>() as usize * N];
+        for (row, samples) in samples.chunks_exact(extent.x as usize).enumerate() {
+            let (y, z) = (row % extent.y as usize, row / extent.y as usize);
+            let to = &mut all[nx * (y + ny * z) * N..][..samples.len() * N];
+            to.as_chunks_mut::<N>().0.iter_mut().zip(samples).for_each(|(to, sample)| *to = to_le_bytes(*sample));
+        }
+        Ok(all)
     }
 
     /// The sample of all that is not stored, little-endian, in the type that samples are read into.

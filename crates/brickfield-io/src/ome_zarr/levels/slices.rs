@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use brickfield_core::glam::UVec3;
-use brickfield_core::{ScalarType, Voxels};
+use brickfield_core::{ScalarType, Volume, Voxels};
+use zarrs::storage::{ListableStorageTraits, ReadableStorage};
 
 use super::ZarrLevels;
 use crate::numbers::{FileScalar, with_room};
-use crate::{ByteOrder, Note, OpenOptions, ReadError, SliceSource, VolumeFacts};
+use crate::{ByteOrder, Note, OpenOptions, Opened, ReadError, SliceSource, VolumeFacts};
 
 struct ZarrSlices {
     levels: ZarrLevels,
@@ -28,6 +29,22 @@ pub(crate) fn slices(folder: &Path, options: &OpenOptions) -> Result<Option<Box<
     let facts = levels.facts().clone();
     Ok(Some(Box::new(ZarrSlices { levels, facts, n_read: 0 })))
 }
+
+/// The whole volume, of a store whose finest level is stored as details.
+pub(in super::super) fn read_details(
+    store: &ReadableStorage,
+    list: &dyn ListableStorageTraits,
+    options: &OpenOptions,
+) -> Result<Opened, ReadError> {
+    // Rows of chunks share those of the next level.
+    let levels = ZarrLevels::of_store(store.clone(), list, options, DETAILS_CACHE_BYTES)?;
+    let facts = levels.facts().clone();
+    let voxels = levels.box_voxels(0, UVec3::ZERO, facts.grid.dims())?;
+    let VolumeFacts { grid, rescale, format, frame, unit, notes, choices, .. } = facts;
+    Ok(Opened { volume: Volume::rescaled(grid, voxels, rescale)?, format, frame, unit, notes, choices })
+}
+
+const DETAILS_CACHE_BYTES: u64 = 16 << 20;
 
 impl SliceSource for ZarrSlices {
     fn facts(&self) -> &VolumeFacts {

@@ -1,15 +1,15 @@
 //! Writing one level: slices are held until a layer of chunks is full.
 
 use brickfield_core::glam::UVec3;
-use brickfield_core::{Level, Scalar, ScalarType, Voxels, with_voxels};
+use brickfield_core::{Scalar, ScalarType, Voxels, with_voxels};
 use serde_json::{Value, json};
 use zarrs::array::{Array, CodecOptions, Element};
 use zarrs::storage::{StoreKey, WritableStorage, WritableStorageTraits};
 
-use super::super::write::data_type;
-use super::Fault;
+use super::super::write::{data_type, little_endian};
 use super::digest::keys;
 use super::layer::append;
+use super::{Fault, details};
 use crate::Compression;
 use crate::samples::room_for;
 
@@ -19,7 +19,9 @@ pub(super) const CHUNK_SIDE: u32 = 32;
 const SHARD_SIDE: u32 = 512;
 
 pub(super) struct LevelWriter {
+    store: WritableStorage,
     array: Array<dyn WritableStorageTraits>,
+    has_details: bool,
     key: String,
     metadata: Value,
     dims: UVec3,
@@ -31,23 +33,39 @@ pub(super) struct LevelWriter {
 }
 
 impl LevelWriter {
-    /// Level `level` of a volume of `dims` voxels.
+    /// A level of `dims` samples, as the array of a path.
     pub(super) fn new(
         store: &WritableStorage,
+        path: &str,
         dims: UVec3,
-        level: Level,
         scalar: ScalarType,
         compression: Compression,
     ) -> Result<LevelWriter, Fault> {
-        let dims = level.dims_of(dims);
-        let whole_chunks = |n: u32| n.div_ceil(CHUNK_SIDE) * CHUNK_SIDE;
-        let shard = UVec3::new(whole_chunks(dims.x), whole_chunks(dims.y), CHUNK_SIDE);
-        let shard = shard.min(UVec3::new(SHARD_SIDE, SHARD_SIDE, CHUNK_SIDE));
-        let metadata = metadata(dims, shard, scalar, compression);
-        let path = format!("/{}", level.0);
-        let array = Array::new_with_metadata(store.clone(), &path, serde_json::from_value(metadata.clone())?)?;
-        let key = format!("{}/zarr.json", level.0);
-        Ok(LevelWriter { array, key, metadata, dims, shard, held: room_for(scalar, 0)?, n_written: 0 })
+        let shard = shard_of(dims);
+        let mut codecs = vec![little_endian()];
+        if compression == Compression::Lossless {
+            codecs.push(json!({ "name": "zstd", "configuration": { "level": 3, "checksum": false } }));
+        }
+        codecs.push(checksum());
+        let metadata = metadata(dims, shard, scalar, codecs);
+        let array =
+            Array::new_with_metadata(store.clone(), &format!("/{path}"), serde_json::from_value(metadata.clone())?)?;
+        let key = format!("{path}/zarr.json");
+        let (store, held) = (store.clone(), room_for(scalar, 0)?);
+        Ok(LevelWriter { store, array, has_details: false, key, metadata, dims, shard, held, n_written: 0 })
+    }
+
+    /// A level of `dims` samples, as details of the next one.
+    pub(super) fn of_details(
+        store: &WritableStorage,
+        path: &str,
+        dims: UVec3,
+        scalar: ScalarType,
+    ) -> Result<LevelWriter, Fault> {
+        // Chunks lie where those of such an array would.
+        let plain = LevelWriter::new(store, path, dims, scalar, Compression::None)?;
+        let metadata = metadata(dims, plain.shard, scalar, vec![details::codec()]);
+        Ok(LevelWriter { has_details: true, metadata, ..plain })
     }
 
     pub(super) fn dims(&self) -> UVec3 {
@@ -98,11 +116,23 @@ impl LevelWriter {
         let n_shards = (self.dims - 1) / self.shard + 1;
         for y in 0..n_shards.y {
             for x in 0..n_shards.x {
-                with_voxels!(layer, v => self.write_shard(v, x, y)?);
+                match self.has_details {
+                    true => self.write_details(layer, x, y)?,
+                    false => with_voxels!(layer, v => self.write_shard(v, x, y)?),
+                }
             }
         }
         self.n_written += (layer.len() / self.n_slice()) as u32;
         Ok(())
+    }
+
+    /// Writes a shard of the layer's details.
+    fn write_details(&self, layer: &Voxels, x: u32, y: u32) -> Result<(), Fault> {
+        let first = UVec3::new(x, y, 0) * self.shard;
+        let n_slices = (layer.len() / self.n_slice()) as u32;
+        let shard = details::shard(layer, self.dims.with_z(n_slices), first, self.shard)?;
+        let z = self.n_written / CHUNK_SIDE;
+        Ok(self.store.set(&self.array.chunk_key(&[z, y, x].map(u64::from)), shard.into())?)
     }
 
     /// Writes a shard of the layer, filled up with zeros.
@@ -135,23 +165,23 @@ impl LevelWriter {
     }
 }
 
-fn metadata(dims: UVec3, shard: UVec3, scalar: ScalarType, compression: Compression) -> Value {
+/// Samples of a shard of an array.
+fn shard_of(dims: UVec3) -> UVec3 {
+    let whole_chunks = |n: u32| n.div_ceil(CHUNK_SIDE) * CHUNK_SIDE;
+    let shard = UVec3::new(whole_chunks(dims.x), whole_chunks(dims.y), CHUNK_SIDE);
+    shard.min(UVec3::new(SHARD_SIDE, SHARD_SIDE, CHUNK_SIDE))
+}
+
+fn metadata(dims: UVec3, shard: UVec3, scalar: ScalarType, codecs: Vec<Value>) -> Value {
     let slowest_first = |v: UVec3| [v.z, v.y, v.x];
-    let little = json!({ "name": "bytes", "configuration": { "endian": "little" } });
-    let checksum = json!({ "name": "crc32c" });
-    let mut codecs = vec![little.clone()];
-    if compression == Compression::Lossless {
-        codecs.push(json!({ "name": "zstd", "configuration": { "level": 3, "checksum": false } }));
-    }
-    codecs.push(checksum.clone());
     let chunk = [CHUNK_SIDE; 3];
     let sharding = json!({
         "name": "sharding_indexed",
         "configuration": {
             "chunk_shape": chunk,
             "codecs": codecs,
-            "index_codecs": [little, checksum],
-            "index_location": "end"
+            "index_codecs": [little_endian(), checksum()],
+            "index_location": "start"
         }
     });
     json!({
@@ -165,4 +195,8 @@ fn metadata(dims: UVec3, shard: UVec3, scalar: ScalarType, compression: Compress
         "codecs": [sharding],
         "dimension_names": ["z", "y", "x"]
     })
+}
+
+fn checksum() -> Value {
+    json!({ "name": "crc32c" })
 }

@@ -1,10 +1,12 @@
 //! Writing all levels of a volume as OME-Zarr 0.5, slice by slice.
 
+mod details;
 mod digest;
 mod layer;
 mod level;
 mod summaries;
 
+pub(super) use details::{DETAILS_CODEC, decode_details};
 pub(super) use digest::{digest, keys};
 pub(super) use summaries::{FOLDER, N_COLUMNS, summary_of};
 
@@ -14,15 +16,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use brickfield_core::glam::UVec3;
-use brickfield_core::{BlockSide, BlockSummary, Grid, Level, ScalarType, Voxels};
+use brickfield_core::{BlockSide, BlockSummary, Grid, Level, Rescale, ScalarType, Voxels};
 use serde_json::{Value, json};
 use zarrs::filesystem::FilesystemStore;
 use zarrs::storage::{ReadableWritableStorage, StoreKey, WritableStorage};
 
-use super::write::group;
+use super::write::{dataset, group};
 use crate::placement::is_turned;
 use crate::saved::{UNFINISHED, folder_of};
-use crate::{SaveError, SaveNote, SaveOptions};
+use crate::{Format, SaveError, SaveNote, SaveOptions};
 use level::LevelWriter;
 use summaries::SummaryWriter;
 
@@ -31,14 +33,23 @@ pub(super) const PACKED_KEY: &str = "brickfield_pack";
 /// The attribute with the world steps along x, y and z of a volume whose axes are not the world's.
 pub(super) const STEPS_KEY: &str = "brickfield_steps";
 const PACKED_VERSION: u64 = 2;
+/// The attribute with the dataset of level 0, if that is stored as details: path and transformations, as datasets of OME-Zarr have them.
+pub(super) const DETAILS_KEY: &str = "brickfield_details";
+/// The array of details.
+const DETAILS_PATH: &str = "brickfield_details/0";
+/// The attribute with slope and intercept of values whose stored numbers are samples.
+pub(super) const RESCALE_KEY: &str = "brickfield_rescale";
 
 pub(super) type Fault = Box<dyn std::error::Error + Send + Sync>;
 
 /// Writes a volume and its coarser levels as OME-Zarr 0.5 (Zarr v3), slice by slice, whole or not at all.
 ///
-/// Chunks are 32^3 samples, packed by zstd, each with a checksum (CRC-32C), in shards of 32 x 512 x 512 (z, y, x). The arrays are `0`,
-/// the finest, `1`, ... Metadata are written last, into a folder of a temporary name beside the store, which is renamed when all is
-/// there: an interrupted run leaves no store that looks complete.
+/// Chunks are 32^3 samples, packed by zstd, each with a checksum (CRC-32C), in shards of 32 x 512 x 512 (z, y, x) that begin with their
+/// index. The arrays are `0`, the finest, `1`, ... Metadata are written last, into a folder of a temporary name beside the store, which
+/// is renamed when all is there: an interrupted run leaves no store that looks complete.
+///
+/// With [`Finest::Details`] there is no array `0`: `brickfield_details/0` has in its place the details by which level 0 differs from level 1
+/// (the codec `brickfield.haar_details`), 7/8 of its samples. Other programs open levels 1 and coarser.
 ///
 /// Summaries of blocks (Ljung, Lundstroem and Ynnerman 2006) are arrays of their own, `brickfield_blocks/8`, `/16` and `/32`, of 64-bit
 /// floats: axes z, y, x of the blocks, and columns. These are least, greatest, mean and variance of the voxels, the parts of the
@@ -56,21 +67,45 @@ pub struct PyramidWriter {
     summaries: Vec<SummaryWriter>,
 }
 
+/// What a store is to hold.
+#[derive(Clone, Debug, Default)]
+pub struct PyramidOptions {
+    /// Frame and unit; how samples are compressed.
+    pub save: SaveOptions,
+    /// The coarsest level; level l has ceil(dims / 2^l) samples.
+    pub coarsest: Level,
+    /// How level 0 is stored.
+    pub finest: Finest,
+    /// What samples mean, if not themselves. OME-Zarr has no words for it: it is stated in an attribute of our own.
+    pub rescale: Rescale,
+}
+
+/// How the finest level of a store is stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Finest {
+    /// As the other levels are.
+    #[default]
+    Array,
+    /// As details that are added to level 1 (Saladi, Pinnamaneni and Meyer 2003). Of integers only; `coarsest` is at least 1.
+    Details,
+}
+
 /// The name of the store in its temporary folder.
 const STORE: &str = "store";
 
 impl PyramidWriter {
-    /// Begins a store of levels 0 to `coarsest`, level l of ceil(dims / 2^l) samples, at a path where nothing is yet.
+    /// Begins a store of levels 0 to `options.coarsest` at a path where nothing is yet.
     ///
     /// # Errors
-    /// If there is something of this name; if the folder cannot be written to.
+    /// If there is something of this name; if the folder cannot be written to; details of samples that are not integers, or of a volume
+    /// without level 1.
     pub fn create(
         path: &Path,
         grid: &Grid,
         scalar: ScalarType,
-        coarsest: Level,
-        options: &SaveOptions,
+        options: &PyramidOptions,
     ) -> Result<PyramidWriter, SaveError> {
+        check_finest(path, scalar, options)?;
         let fault = |source| SaveError::Io { path: path.to_owned(), source };
         if path.exists() {
             return Err(SaveError::IsThere { path: path.to_owned() });
@@ -83,7 +118,7 @@ impl PyramidWriter {
         let store = unfinished.path().join(STORE);
         fs::create_dir(&store).map_err(fault)?;
         let store = FilesystemStore::new(store).map_err(|e| fault(io::Error::other(e)))?;
-        let mut writer = PyramidWriter::of_store(path, Arc::new(store), grid, scalar, coarsest, options)?;
+        let mut writer = PyramidWriter::of_store(path, Arc::new(store), grid, scalar, options)?;
         writer.unfinished = Some(unfinished);
         Ok(writer)
     }
@@ -93,10 +128,17 @@ impl PyramidWriter {
         store: ReadableWritableStorage,
         grid: &Grid,
         scalar: ScalarType,
-        coarsest: Level,
-        options: &SaveOptions,
+        options: &PyramidOptions,
     ) -> Result<PyramidWriter, SaveError> {
-        let mut group = group(grid, options, coarsest);
+        let PyramidOptions { save, coarsest, finest, rescale } = options;
+        let first = if *finest == Finest::Details { Level(1) } else { Level(0) };
+        let mut group = group(grid, save, first..=*coarsest);
+        if *finest == Finest::Details {
+            group["attributes"][DETAILS_KEY] = dataset(grid, Level(0), DETAILS_PATH);
+        }
+        if *rescale != Rescale::IDENTITY {
+            group["attributes"][RESCALE_KEY] = json!({ "slope": rescale.slope(), "intercept": rescale.intercept() });
+        }
         if (0..3).any(|axis| is_turned(grid, axis)) {
             group["attributes"][STEPS_KEY] = json!(grid.index_to_world().matrix3.to_cols_array_2d());
         }
@@ -110,7 +152,12 @@ impl PyramidWriter {
         };
         let store: WritableStorage = store;
         let levels = (0..=coarsest.0)
-            .map(|l| LevelWriter::new(&store, grid.dims(), Level(l), scalar, options.compression))
+            .map(|l| match l == 0 && *finest == Finest::Details {
+                true => LevelWriter::of_details(&store, DETAILS_PATH, grid.dims(), scalar),
+                false => {
+                    LevelWriter::new(&store, &l.to_string(), Level(l).dims_of(grid.dims()), scalar, save.compression)
+                }
+            })
             .collect::<Result<_, Fault>>();
         writer.levels = levels.map_err(|e| writer.fault(e))?;
         let summaries = BlockSide::ALL.map(|side| SummaryWriter::new(&store, grid.dims(), side));
@@ -120,8 +167,13 @@ impl PyramidWriter {
 
     /// What the store does not state in words of OME-Zarr.
     pub fn notes(&self) -> Vec<SaveNote> {
-        let is_turned = !self.group["attributes"][STEPS_KEY].is_null();
-        is_turned.then_some(SaveNote::DirectionOwn).into_iter().collect()
+        let states = |key: &str| !self.group["attributes"][key].is_null();
+        let notes = [
+            (STEPS_KEY, SaveNote::DirectionOwn),
+            (RESCALE_KEY, SaveNote::RescaleOwn),
+            (DETAILS_KEY, SaveNote::DetailsOwn),
+        ];
+        notes.into_iter().filter(|(key, _)| states(key)).map(|(_, note)| note).collect()
     }
 
     /// Takes the next slices of a level, x fastest, as many as there are; 32 at once of the finest save a copy.
@@ -217,6 +269,19 @@ impl PyramidWriter {
     }
 }
 
+fn check_finest(path: &Path, scalar: ScalarType, options: &PyramidOptions) -> Result<(), SaveError> {
+    let refused = |fault: String| Err(SaveError::Unsupported { path: path.to_owned(), format: Format::OmeZarr, fault });
+    match options.finest {
+        Finest::Details if options.coarsest < Level(1) => refused(
+            "details refine level 1, which the store is not to have; its coarsest level must be at least 1".to_owned(),
+        ),
+        Finest::Details if matches!(scalar, ScalarType::F32 | ScalarType::F64) => {
+            refused(format!("details are those of integers, and the samples are {scalar}"))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Whether the attributes of a group say that this crate packed it.
 pub(super) fn is_packed(attributes: &Value) -> bool {
     attributes[PACKED_KEY]["version"] == PACKED_VERSION
@@ -294,8 +359,8 @@ mod tests {
         let dims = UVec3::new(40, 33, 70);
         let grid = Grid::axis_aligned(dims, DVec3::ONE).unwrap();
         let path = Path::new("head.zarr");
-        let (store, options) = (disk.clone(), SaveOptions::default());
-        let mut writer = PyramidWriter::of_store(path, store, &grid, ScalarType::U16, Level(1), &options)?;
+        let options = PyramidOptions { coarsest: Level(1), ..PyramidOptions::default() };
+        let mut writer = PyramidWriter::of_store(path, disk.clone(), &grid, ScalarType::U16, &options)?;
         for (level, dims) in [(Level(0), dims), (Level(1), (dims - 1) / 2 + 1)] {
             let noise = (0..dims.element_product()).map(|i| i.wrapping_mul(2_654_435_761).to_le_bytes()[2].into());
             writer.push(level, noise.collect::<Vec<u16>>().into())?;

@@ -15,7 +15,7 @@ use brickfield::options::{
     BlockArgs, Boxes, InputOptions, LightOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions, values,
 };
 use brickfield::overlay::LEVEL_COLORS;
-use brickfield::{AdapterInfo, BackendError, BackendKind, BackendStatus, Trimming, Validation, backends};
+use brickfield::{AdapterInfo, BackendError, BackendKind, BackendStatus, Codec, Trimming, Validation, backends};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
 
@@ -95,9 +95,10 @@ struct PackArgs {
     /// no store
     #[arg(short, long, value_name = "STORE")]
     out: PathBuf,
-    /// Save samples as they are; otherwise they are compressed without loss
-    #[arg(long)]
-    unpacked: bool,
+    /// How samples are coded, without loss: zstd (every program opens all levels), haar (least bytes; integers only; level 0 as details of
+    /// level 1, so that other programs open levels 1 and coarser) or none
+    #[arg(long, value_name = "CODEC", default_value = "zstd", value_parser = values::codec)]
+    codec: Codec,
     #[command(flatten)]
     input: InputOptions,
 }
