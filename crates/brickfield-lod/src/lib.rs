@@ -10,8 +10,9 @@ mod tile;
 
 pub use blocks::{
     BlockBudget, BlockErrors, BlockLevels, BlockLevelsError, BlockSelection, BlockView, BudgetError, BudgetSize,
-    EstimateError, Importance, LevelErrors, OneSampleBlocks, Reconstruction, Slab, SlabError, block_weights,
-    changed_values, exact_errors, rank_correlation, select_block_levels, spend_rest,
+    EstimateError, FetchItem, FetchOrder, FetchOrderError, Importance, LevelErrors, OneSampleBlocks, Reconstruction,
+    Slab, SlabError, block_weights, changed_values, exact_errors, fetch_order, rank_correlation, select_block_levels,
+    spend_rest,
 };
 pub use criterion::{Criterion, CriterionInView};
 pub use filter::{And, Answer, Filter};

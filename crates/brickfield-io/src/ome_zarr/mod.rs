@@ -12,11 +12,12 @@ mod json;
 mod levels;
 mod metadata;
 mod node;
+mod objects;
 mod pack;
 mod write;
 
-pub use levels::ZarrLevels;
 pub(crate) use levels::slices;
+pub use levels::{ObjectRange, ROOT_DOCUMENT, StoredChunk, ZarrLevels, stated_documents};
 pub use pack::{Finest, PyramidOptions, PyramidWriter};
 pub use write::save;
 

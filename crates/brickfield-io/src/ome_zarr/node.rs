@@ -1,12 +1,12 @@
 //! The nodes of a store: groups and arrays, with their attributes.
 
-use brickfield_core::Rescale;
 use brickfield_core::glam::DMat3;
+use brickfield_core::{BlockSide, Rescale};
 use serde_json::Value;
 use zarrs::storage::{ListableStorageTraits, ReadableStorage, StorePrefix};
 
 use super::json::read_json;
-use super::pack::{DETAILS_KEY, RESCALE_KEY, STEPS_KEY, is_packed, stated_digest};
+use super::pack::{DETAILS_KEY, RESCALE_KEY, STEPS_KEY, is_packed, stated_digest, stated_summary_bytes};
 use crate::files::stays_within;
 use crate::{ReadError, WorldFrame};
 
@@ -47,6 +47,11 @@ impl Node {
     /// Whether this crate packed the group: then all of its shards are there.
     pub(super) fn is_packed(&self) -> bool {
         is_packed(&self.attributes)
+    }
+
+    /// The bytes of its summaries of blocks of a side that a packed store states.
+    pub(super) fn stated_summary_bytes(&self, side: BlockSide) -> Option<u64> {
+        stated_summary_bytes(&self.attributes, side)
     }
 
     /// The digest of its samples that a packed store states.

@@ -1,11 +1,16 @@
 //! Stores whose finest level is details of level 1.
 
-use std::fs;
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::{fs, io};
 
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Grid, Level, Rescale, Scalar, ScalarType, ValueRange, Voxels};
-use brickfield_io::ome_zarr::{Finest, PyramidOptions, PyramidWriter, ZarrLevels};
+use brickfield_core::{Grid, Level, Objects, Rescale, Scalar, ScalarType, ValueRange, Voxels};
+use brickfield_io::ome_zarr::{
+    Finest, ObjectRange, PyramidOptions, PyramidWriter, ROOT_DOCUMENT, ZarrLevels, stated_documents,
+};
 use brickfield_io::{Compression, OpenOptions, SaveNote, open};
 
 const DIMS: UVec3 = UVec3::new(75, 40, 69);
@@ -166,4 +171,66 @@ fn damaged_details_are_errors() {
     // Another volume's details.
     edit(&metadata, |text| text.replacen("75", "73", 1));
     assert!(fault().contains("level of details"), "{}", fault());
+}
+
+/// The objects of a folder.
+struct Folder(PathBuf);
+
+impl Objects for Folder {
+    fn n_bytes(&self, key: &str) -> io::Result<Option<u64>> {
+        Ok(fs::metadata(self.0.join(key)).ok().map(|m| m.len()))
+    }
+
+    fn read(&self, key: &str, ranges: &[Range<u64>]) -> io::Result<Option<Vec<Vec<u8>>>> {
+        let Ok(bytes) = fs::read(self.0.join(key)) else { return Ok(None) };
+        let part = |range: &Range<u64>| bytes.get(range.start as usize..range.end as usize).map(<[u8]>::to_vec);
+        let parts: Option<Vec<_>> = ranges.iter().map(part).collect();
+        parts.map(Some).ok_or(io::ErrorKind::UnexpectedEof.into())
+    }
+}
+
+#[test]
+fn objects_are_read_as_files_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("head.zarr");
+    let written = samples(0.0, 255.0);
+    write::<u8>(&path, &written, Rescale::IDENTITY);
+    let objects = Arc::new(Folder(path.clone()));
+    let levels = ZarrLevels::of_objects(objects.clone(), &path, &OpenOptions::default(), 1 << 20).unwrap();
+    assert_eq!(levels.box_voxels(0, UVec3::ZERO, DIMS).unwrap(), Voxels::U8(written));
+    // Indices and chunks are all the bytes of all shards.
+    for level in 0..2 {
+        let chunks = levels.stored_chunks(level).unwrap();
+        let n_voxels: u64 = chunks.iter().map(|chunk| chunk.extent.as_u64vec3().element_product()).sum();
+        assert_eq!(n_voxels, levels.dims(level).as_u64vec3().element_product());
+        let ranges = levels.indices(level).into_iter().chain(chunks.iter().map(|chunk| chunk.bytes.clone()));
+        let mut left: BTreeMap<String, u64> = BTreeMap::new();
+        for ObjectRange { key, range } in ranges {
+            let range = range.unwrap();
+            *left.entry(key.clone()).or_insert_with(|| objects.n_bytes(&key).unwrap().unwrap()) -=
+                range.end - range.start;
+        }
+        assert!(left.values().all(|n| *n == 0), "{left:?}");
+        let shards: Vec<_> = levels.whole_level(level).into_iter().map(|whole| whole.key).collect();
+        assert_eq!(left.keys().cloned().collect::<Vec<_>>(), shards);
+        assert!(
+            chunks.iter().all(|chunk| chunk.bytes.range.as_ref().is_some_and(|r| r.end - r.start == chunk.n_bytes))
+        );
+    }
+}
+
+/// One request finds the documents that every program reads.
+#[test]
+fn the_root_document_has_those_of_all_levels() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("head.zarr");
+    write::<u8>(&path, &samples(0.0, 255.0), Rescale::IDENTITY);
+    let (stated, others) = stated_documents(&fs::read(path.join(ROOT_DOCUMENT)).unwrap()).unwrap();
+    assert_eq!((stated.len(), &others[..]), (1, &["brickfield_details/0/zarr.json".to_owned()][..]));
+    let json = |bytes: &[u8]| serde_json::from_slice::<serde_json::Value>(bytes).unwrap();
+    for (key, bytes) in stated {
+        assert_eq!(json(&bytes), json(&fs::read(path.join(key)).unwrap()));
+    }
+    assert!(stated_documents(b"{").is_err());
+    assert_eq!(stated_documents(b"{}").unwrap(), (vec![], vec![]));
 }

@@ -256,7 +256,7 @@ fn what_is_lost_or_damaged_is_named() {
     let good = fs::read(&shard).unwrap();
     // A byte of a chunk.
     let mut bad = good.clone();
-    let entry = good[good.len() - 100..].first_chunk().map(|offset| u64::from_le_bytes(*offset)).unwrap();
+    let entry = good.first_chunk().map(|offset| u64::from_le_bytes(*offset)).unwrap();
     bad[entry as usize + 10] ^= 1;
     fs::write(&shard, &bad).unwrap();
     let message = fault(0, UVec3::new(0, 0, 69));
@@ -264,8 +264,7 @@ fn what_is_lost_or_damaged_is_named() {
     assert!(whole().contains("chunk [2, 0, 0]"), "{}", whole());
     // A byte of the index.
     let mut bad = good.clone();
-    let end = bad.len();
-    bad[end - 20] ^= 1;
+    bad[20] ^= 1;
     fs::write(&shard, &bad).unwrap();
     let message = fault(0, UVec3::new(0, 0, 69));
     assert_eq!(message, "the checksum of the index of shard [2, 0, 0] of array \"0\" is wrong: it is damaged");

@@ -3,9 +3,11 @@
 mod cache;
 mod parts;
 mod slices;
+mod stored;
 
 pub(super) use slices::read_details;
 pub(crate) use slices::slices;
+pub use stored::{ObjectRange, ROOT_DOCUMENT, StoredChunk, stated_documents};
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,7 +15,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use brickfield_core::Level;
 use brickfield_core::glam::{U64Vec3, UVec3};
-use brickfield_core::{BlockLayout, BlockSide, BlockSummary, ScalarType, Voxels};
+use brickfield_core::{BlockLayout, BlockSide, BlockSummary, Objects, ScalarType, Voxels};
 use zarrs::filesystem::FilesystemStore;
 use zarrs::storage::{ListableStorageTraits, ReadableStorage};
 
@@ -21,6 +23,7 @@ use super::axes::VolumeAxes;
 use super::find::{Depth, ImageArray, find_levels};
 use super::metadata::ArrayMetadata;
 use super::node::{Node, joined};
+use super::objects::ObjectStorage;
 use super::pack::{FOLDER, N_COLUMNS, digest, summary_of};
 use crate::guard::guarded;
 use crate::limits::{CheckedShape, check_bytes};
@@ -72,6 +75,21 @@ impl ZarrLevels {
             guarded("Zarr", || ZarrLevels::of_store(store.clone(), &*store, options, cache_bytes))
         });
         opened.map_err(|fault| OpenError::new(folder, fault))
+    }
+
+    /// Opens a store whose objects are found by their keys; `location` is where they are, for messages.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open); a store that is no image of OME-Zarr, because objects are not listed.
+    pub fn of_objects(
+        objects: Arc<dyn Objects>,
+        location: &Path,
+        options: &OpenOptions,
+        cache_bytes: u64,
+    ) -> Result<ZarrLevels, OpenError> {
+        let store = Arc::new(ObjectStorage(objects));
+        let opened = guarded("Zarr", || ZarrLevels::of_store(store.clone(), &*store, options, cache_bytes));
+        opened.map_err(|fault| OpenError::new(location, fault))
     }
 
     fn of_store(
@@ -133,6 +151,11 @@ impl ZarrLevels {
     /// there is one sample, it covers all. `None` if the level has other samples, or another type.
     pub fn shifts(&self, level: usize) -> Option<UVec3> {
         self.levels[level].shifts
+    }
+
+    /// Whether a level is stored as details of the next one.
+    pub fn has_details(&self, level: usize) -> bool {
+        self.levels[level].parts.has_details()
     }
 
     /// Whether [`PyramidWriter`](super::PyramidWriter) wrote the store.

@@ -1,5 +1,6 @@
 //! The smallest parts of an array that can be read alone: its chunks, or the parts of its shards.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use brickfield_core::glam::UVec3;
@@ -49,6 +50,13 @@ pub(super) enum StoredPart {
     Fill,
     /// The file is not there.
     Missing,
+}
+
+/// Where a part lies: an object, its range or all of it, and the number of its bytes.
+pub(super) struct StoredPlace {
+    pub(super) key: String,
+    pub(super) range: Option<Range<u64>>,
+    pub(super) n_bytes: u64,
 }
 
 const NO_PART: (u64, u64) = (u64::MAX, u64::MAX);
@@ -138,7 +146,7 @@ impl Parts {
         let key = self.chunks.chunk_key(chunk);
         let Some(n_file_bytes) = self.store.size_key(&key).map_err(fault)? else { return Ok(None) };
         let n_entries: u64 = self.per_chunk.iter().product();
-        let n_bytes = n_entries * ENTRY_BYTES + if shard.index_has_checksum { CHECKSUM_BYTES } else { 0 };
+        let n_bytes = self.n_index_bytes(shard);
         check_length(&format!("{what}, with an index of {},", bytes(n_bytes)), n_file_bytes, n_bytes.into())?;
         let range = match shard.is_index_first {
             true => ByteRange::FromStart(0, Some(n_bytes)),
@@ -167,22 +175,62 @@ impl Parts {
         let stored = match (&self.packing, index) {
             (Packing::Plain(_), _) => self.store.get(&key).map_err(fault)?,
             (Packing::Shard(_), None) => None,
-            (Packing::Shard(_), Some(index)) => {
-                let (offset, n_bytes) = index.entries[self.place_in_chunk(part)];
-                if (offset, n_bytes) == NO_PART {
-                    return Ok(StoredPart::Fill);
+            (Packing::Shard(_), Some(index)) => match self.place_in(index, part)? {
+                Some((offset, n_bytes)) => {
+                    self.store.get_partial(&key, ByteRange::FromStart(offset, Some(n_bytes))).map_err(fault)?
                 }
-                if offset.checked_add(n_bytes).is_none_or(|end| end > index.n_file_bytes) {
-                    let field = format!("the place of {}", self.named(part));
-                    let expected = format!("within the {} of its shard", bytes(index.n_file_bytes));
-                    return Err(ReadError::field(field, format!("{offset} + {n_bytes}"), expected));
-                }
-                self.store.get_partial(&key, ByteRange::FromStart(offset, Some(n_bytes))).map_err(fault)?
-            }
+                None => return Ok(StoredPart::Fill),
+            },
         };
         let Some(stored) = stored else { return Ok(StoredPart::Missing) };
         read(stored.len() as u64);
         Ok(StoredPart::Bytes(stored.into()))
+    }
+
+    /// Offset and length of a part in its shard; `None` if it holds nothing but the fill value.
+    fn place_in(&self, index: &ShardIndex, part: &[u64]) -> Result<Option<(u64, u64)>, ReadError> {
+        let (offset, n_bytes) = index.entries[self.place_in_chunk(part)];
+        if (offset, n_bytes) == NO_PART {
+            return Ok(None);
+        }
+        if offset.checked_add(n_bytes).is_none_or(|end| end > index.n_file_bytes) {
+            let field = format!("the place of {}", self.named(part));
+            let expected = format!("within the {} of its shard", bytes(index.n_file_bytes));
+            return Err(ReadError::field(field, format!("{offset} + {n_bytes}"), expected));
+        }
+        Ok(Some((offset, n_bytes)))
+    }
+
+    /// Where a part lies; `None` if it is not stored.
+    pub(super) fn stored_place(
+        &self,
+        part: &[u64],
+        index: Option<&ShardIndex>,
+    ) -> Result<Option<StoredPlace>, ReadError> {
+        let chunk_key = self.chunks.chunk_key(&self.chunk_of(part));
+        let key = chunk_key.as_str().to_owned();
+        match (&self.packing, index) {
+            (Packing::Plain(_), _) => {
+                let n_bytes = self.store.size_key(&chunk_key).map_err(|e| ReadError::decoder(self.named(part), e))?;
+                Ok(n_bytes.map(|n_bytes| StoredPlace { key, range: None, n_bytes }))
+            }
+            (Packing::Shard(_), None) => Ok(None),
+            (Packing::Shard(_), Some(index)) => {
+                let place = self.place_in(index, part)?;
+                Ok(place.map(|(offset, n_bytes)| StoredPlace { key, range: Some(offset..offset + n_bytes), n_bytes }))
+            }
+        }
+    }
+
+    /// The bytes of a shard that are its index; `None`, for all of it, if the index is at its end.
+    pub(super) fn index_range(&self) -> Option<Range<u64>> {
+        let Packing::Shard(shard) = &self.packing else { return None };
+        shard.is_index_first.then(|| 0..self.n_index_bytes(shard))
+    }
+
+    fn n_index_bytes(&self, shard: &Shard) -> u64 {
+        let n_entries: u64 = self.per_chunk.iter().product();
+        n_entries * ENTRY_BYTES + if shard.index_has_checksum { CHECKSUM_BYTES } else { 0 }
     }
 
     /// The number of a part in its chunk, the last axis fastest.

@@ -22,7 +22,7 @@ pub(super) struct LevelWriter {
     store: WritableStorage,
     array: Array<dyn WritableStorageTraits>,
     has_details: bool,
-    key: String,
+    path: String,
     metadata: Value,
     dims: UVec3,
     shard: UVec3,
@@ -50,9 +50,8 @@ impl LevelWriter {
         let metadata = metadata(dims, shard, scalar, codecs);
         let array =
             Array::new_with_metadata(store.clone(), &format!("/{path}"), serde_json::from_value(metadata.clone())?)?;
-        let key = format!("{path}/zarr.json");
-        let (store, held) = (store.clone(), room_for(scalar, 0)?);
-        Ok(LevelWriter { store, array, has_details: false, key, metadata, dims, shard, held, n_written: 0 })
+        let (store, path, held) = (store.clone(), path.to_owned(), room_for(scalar, 0)?);
+        Ok(LevelWriter { store, array, has_details: false, path, metadata, dims, shard, held, n_written: 0 })
     }
 
     /// A level of `dims` samples, as details of the next one.
@@ -155,9 +154,9 @@ impl LevelWriter {
         Ok(self.array.store_chunk_opt(&[z, y, x].map(u64::from), samples, &whole)?)
     }
 
-    /// The metadata, and their key. Those that `zarrs` writes have codecs by bare names, which not every reader takes.
+    /// The array's path, and its metadata. Those that `zarrs` writes have codecs by bare names, which not every reader takes.
     pub(super) fn metadata(&self) -> (String, &Value) {
-        (self.key.clone(), &self.metadata)
+        (self.path.clone(), &self.metadata)
     }
 
     pub(super) fn shard_keys(&self) -> Vec<StoreKey> {

@@ -17,10 +17,11 @@ use std::sync::Arc;
 
 use brickfield_core::glam::UVec3;
 use brickfield_core::{BlockSide, BlockSummary, Grid, Level, Rescale, ScalarType, Voxels};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use zarrs::filesystem::FilesystemStore;
 use zarrs::storage::{ReadableWritableStorage, StoreKey, WritableStorage};
 
+use super::levels::ROOT_DOCUMENT;
 use super::write::{dataset, group};
 use crate::placement::is_turned;
 use crate::saved::{UNFINISHED, folder_of};
@@ -248,20 +249,31 @@ impl PyramidWriter {
     fn write_metadata(&mut self) -> Result<(), Fault> {
         let shards: Vec<_> = self.levels.iter().map(LevelWriter::shard_keys).collect();
         let digest = digest(&*self.store, &shards)?;
-        self.group["attributes"][PACKED_KEY] = json!({ "version": PACKED_VERSION, "digest": digest });
+        let summary_bytes = self.summaries.iter().map(|s| Ok((s.side().to_string(), s.n_bytes(&*self.store)?.into())));
+        let summary_bytes = summary_bytes.collect::<Result<Map<String, Value>, Fault>>()?;
+        self.group["attributes"][PACKED_KEY] =
+            json!({ "version": PACKED_VERSION, "digest": digest, "summary_bytes": summary_bytes });
         let write = |key: &str, json: &Value| -> Result<(), Fault> {
             Ok(self.store.set(&StoreKey::new(key)?, serde_json::to_vec_pretty(json)?.into())?)
         };
         let summaries: Vec<_> = self.summaries.iter().filter(|s| !s.is_empty()).map(SummaryWriter::metadata).collect();
-        let arrays = self.levels.iter().map(LevelWriter::metadata).chain(summaries.iter().cloned());
-        for (key, json) in arrays {
-            write(&key, json)?;
-        }
+        let inner = json!({ "zarr_format": 3, "node_type": "group", "attributes": {} });
+        let mut nodes: Vec<(String, &Value)> = self.levels.iter().map(LevelWriter::metadata).collect();
         if !summaries.is_empty() {
-            let group = json!({ "zarr_format": 3, "node_type": "group", "attributes": {} });
-            write(&format!("{FOLDER}/zarr.json"), &group)?;
+            nodes.push((FOLDER.to_owned(), &inner));
+            nodes.extend(summaries);
         }
-        write("zarr.json", &self.group)
+        for (path, json) in &nodes {
+            write(&format!("{path}/{ROOT_DOCUMENT}"), json)?;
+        }
+        // Those that every program reads are in the group's document, too: one request finds them all.
+        let is_read_by_all = |(path, _): &&(String, &Value)| path != DETAILS_PATH;
+        let consolidated: Map<String, Value> =
+            nodes.iter().filter(is_read_by_all).map(|(path, json)| (path.clone(), (*json).clone())).collect();
+        let mut group = self.group.clone();
+        group["consolidated_metadata"] =
+            json!({ "kind": "inline", "must_understand": false, "metadata": consolidated });
+        write(ROOT_DOCUMENT, &group)
     }
 
     fn fault(&self, fault: Fault) -> SaveError {
@@ -285,6 +297,11 @@ fn check_finest(path: &Path, scalar: ScalarType, options: &PyramidOptions) -> Re
 /// Whether the attributes of a group say that this crate packed it.
 pub(super) fn is_packed(attributes: &Value) -> bool {
     attributes[PACKED_KEY]["version"] == PACKED_VERSION
+}
+
+/// The bytes of the summaries of blocks of a side that a packed store states.
+pub(super) fn stated_summary_bytes(attributes: &Value, side: BlockSide) -> Option<u64> {
+    attributes[PACKED_KEY]["summary_bytes"][side.to_string()].as_u64()
 }
 
 /// The digest that a packed store states.

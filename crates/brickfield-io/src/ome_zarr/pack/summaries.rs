@@ -4,7 +4,7 @@ use brickfield_core::glam::UVec3;
 use brickfield_core::{BlockLayout, BlockSide, BlockSummary, N_BLOCK_BINS, N_BLOCK_LEVELS, ValueRange};
 use serde_json::{Value, json};
 use zarrs::array::{Array, CodecOptions};
-use zarrs::storage::{WritableStorage, WritableStorageTraits};
+use zarrs::storage::{ReadableStorageTraits, WritableStorage, WritableStorageTraits};
 
 use super::Fault;
 
@@ -17,7 +17,7 @@ pub(in super::super) const N_COLUMNS: usize = 4 + N_BLOCK_LEVELS + N_BLOCK_BINS;
 /// Layers of blocks, one after the other, each a chunk.
 pub(super) struct SummaryWriter {
     array: Array<dyn WritableStorageTraits>,
-    key: String,
+    path: String,
     metadata: Value,
     side: BlockSide,
     n_blocks: UVec3,
@@ -28,10 +28,10 @@ impl SummaryWriter {
     pub(super) fn new(store: &WritableStorage, dims: UVec3, side: BlockSide) -> Result<SummaryWriter, Fault> {
         let n_blocks = BlockLayout::new(dims, side).n_blocks();
         let metadata = metadata(n_blocks);
-        let path = format!("/{FOLDER}/{side}");
-        let array = Array::new_with_metadata(store.clone(), &path, serde_json::from_value(metadata.clone())?)?;
-        let key = format!("{FOLDER}/{side}/zarr.json");
-        Ok(SummaryWriter { array, key, metadata, side, n_blocks, n_layers: 0 })
+        let path = format!("{FOLDER}/{side}");
+        let array =
+            Array::new_with_metadata(store.clone(), &format!("/{path}"), serde_json::from_value(metadata.clone())?)?;
+        Ok(SummaryWriter { array, path, metadata, side, n_blocks, n_layers: 0 })
     }
 
     pub(super) fn side(&self) -> BlockSide {
@@ -44,6 +44,13 @@ impl SummaryWriter {
 
     pub(super) fn n_layers(&self) -> u32 {
         self.n_layers
+    }
+
+    /// The bytes of the layers that are written.
+    pub(super) fn n_bytes(&self, store: &dyn ReadableStorageTraits) -> Result<u64, Fault> {
+        let key = |layer: u32| self.array.chunk_key(&[u64::from(layer), 0, 0, 0]);
+        let sizes = (0..self.n_layers).map(|layer| Ok(store.size_key(&key(layer))?.unwrap_or(0)));
+        sizes.sum()
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -61,9 +68,9 @@ impl SummaryWriter {
         Ok(())
     }
 
-    /// The metadata, and their key. Those that `zarrs` writes have codecs by bare names, which not every reader takes.
+    /// The array's path, and its metadata. Those that `zarrs` writes have codecs by bare names, which not every reader takes.
     pub(super) fn metadata(&self) -> (String, &Value) {
-        (self.key.clone(), &self.metadata)
+        (self.path.clone(), &self.metadata)
     }
 }
 
