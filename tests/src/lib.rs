@@ -15,6 +15,7 @@ pub mod metrics;
 pub mod orders;
 pub mod paper;
 pub mod report;
+pub mod saladi;
 pub mod tong;
 pub mod turns;
 pub mod volumes;

@@ -118,6 +118,10 @@ fn steps() -> Result<Vec<Step>> {
     ];
     let table = [&of_tong[..], &rows].concat();
     steps.push(step_with_data("rows of Tong's table", move || checked("compare", &table).run()));
+    let of_saladi = ["--paper", "saladi", "--check=pictures", "--require", "wgpu,ash"];
+    let rows = ["--part", "normals", "--only", "engine", "--size", "64x64", "--frames", "1"];
+    let normals = [&of_saladi[..], &rows].concat();
+    steps.push(step_with_data("normals of surface voxels", move || checked("compare", &normals).run()));
     Ok(steps)
 }
 

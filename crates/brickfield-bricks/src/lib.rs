@@ -15,8 +15,8 @@ mod tree;
 pub use bins::{Bins, Histogram, N_BINS};
 pub use blocks::{
     BlockBuildError, BlockMemory, BlockOptions, BlockSource, BlockTally, BlockVolume, FetchError, NoCompanion,
-    NoSuchBlock, SourceId, block_memory, block_summaries, build_blocks, fetch_values, greatest_gradient,
-    greatest_spread,
+    NoSuchBlock, SourceId, SurfaceEdit, SurfaceNormals, block_memory, block_summaries, build_blocks, fetch_values,
+    greatest_gradient, greatest_spread,
 };
 pub use build::{BuildError, BuildOptions, Progress, build_tree, build_tree_observed};
 pub use downsample::Downsampling;

@@ -15,6 +15,12 @@ pub enum Companion {
     /// ([`GRADIENT_ZERO`] stands for 0); the fourth is its length, as 255 times the square root of its part of the source's
     /// greatest gradient. All to the nearest.
     Gradient,
+    /// The normal of a surface voxel: one that the transfer function shows, beside one that it makes transparent (Saladi, Pinnamaneni and
+    /// Meyer 2003). It belongs to a source and a transfer function.
+    ///
+    /// Four bytes, as of [`Companion::Gradient`], of the direction towards the inside, -normal. The length is 1 at a surface voxel, and 0
+    /// at others; at coarser levels it is that of the average.
+    SurfaceNormal,
 }
 
 /// The byte of a direction's component that is 0.
@@ -22,13 +28,13 @@ pub const GRADIENT_ZERO: u8 = 127;
 
 impl Companion {
     /// All companions.
-    pub const ALL: [Companion; 2] = [Companion::Spread, Companion::Gradient];
+    pub const ALL: [Companion; 3] = [Companion::Spread, Companion::Gradient, Companion::SurfaceNormal];
 
     /// Bytes of a sample.
     pub const fn n_bytes(self) -> usize {
         match self {
             Companion::Spread => 1,
-            Companion::Gradient => 4,
+            Companion::Gradient | Companion::SurfaceNormal => 4,
         }
     }
 
@@ -37,6 +43,7 @@ impl Companion {
         match self {
             Companion::Spread => "spreads",
             Companion::Gradient => "gradients",
+            Companion::SurfaceNormal => "surface normals",
         }
     }
 }

@@ -105,10 +105,7 @@ impl LightUniform {
             diffuse: terms.diffuse as f32,
             specular: terms.specular as f32,
             shininess: terms.shininess,
-            greatest_slope: plan.gradients().map_or([0.0; 4], |gradients| {
-                let greatest = gradients.decode().scale / plan.value_scale().unit();
-                row(lighting.spacing() * greatest, 0.0)
-            }),
+            greatest_slope: row(lighting.spacing() * (plan.greatest_gradient() / plan.value_scale().unit()), 0.0),
             back: match light.sides() {
                 LitSides::Lower => [0.0; 4],
                 LitSides::Both => [-1.0, 0.0, 0.0, 0.0],

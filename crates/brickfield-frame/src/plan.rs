@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use brickfield_core::glam::{UVec2, UVec3};
 use brickfield_core::{Aabb, Companion, TransferFunction};
-use brickfield_optics::{LightSource, Normals, QuadratureRule};
+use brickfield_optics::{LightSource, Normals, QuadratureRule, SURFACE_STEEPNESS};
 
 use crate::{
     Beams, DarkRegions, Division, Feature, FeatureSet, Field, KeptBoxes, Lighting, Mode, Occupancy, Placement,
@@ -111,9 +111,9 @@ pub enum PlanError {
     #[error("dark regions of another field: rays would pass over samples that are seen")]
     OtherField,
     #[error(
-        "light on stored normals, of samples without gradients: take normals of central differences, or flat blocks"
+        "light on {} normals, of samples without {companion}: take normals of central differences, or flat blocks", normals.name()
     )]
-    NoGradients,
+    NoNormals { normals: Normals, companion: Companion },
     #[error("polygons of spherical shells: a sphere has none; take tessellated shells")]
     RoundPolygons,
     #[error("polygons of whole rays: they are clipped to bricks; divide bricks")]
@@ -133,7 +133,7 @@ impl FramePlan {
     ///
     /// # Errors
     /// A domain outside of the volume; dark regions of another field; spreads with a rule that looks at values between nodes, or without
-    /// ranges; stored normals without gradients; polygons of surfaces that have none, or of blocks that
+    /// ranges; normals that lie beside samples, of samples without them; polygons of surfaces that have none, or of blocks that
     /// are not resident.
     pub fn new(parts: PlanParts) -> Result<FramePlan, PlanError> {
         check(&parts)?;
@@ -240,10 +240,18 @@ impl FramePlan {
         self.lighting.as_ref()
     }
 
-    /// The gradients of the samples; `None` where none are asked for.
+    /// The gradients of the samples, or the normals of surface voxels in their form; `None` where none are asked for.
     pub fn gradients(&self) -> Option<&Arc<Slots>> {
-        let is_asked = self.lighting.is_some_and(|lighting| lighting.light.normals() == Normals::Stored);
-        self.field.companions(Companion::Gradient).filter(|_| is_asked)
+        self.field.companions(self.lighting?.light.normals().companion()?)
+    }
+
+    /// The length that [`gradients`](Self::gradients) of length 1 stand for, in data values per world unit; 0 without any.
+    pub fn greatest_gradient(&self) -> f64 {
+        let (Some(gradients), Some(lighting)) = (self.gradients(), self.lighting) else { return 0.0 };
+        match lighting.light.normals() {
+            Normals::Central | Normals::Stored => gradients.decode().scale,
+            Normals::Surface => SURFACE_STEEPNESS * lighting.light.flat_below(),
+        }
     }
 
     /// Which macrocells of bricks are dark; `None` where nothing inside a brick is leapt over.
@@ -358,9 +366,12 @@ fn check(parts: &PlanParts) -> Result<(), PlanError> {
     if field.companions(Companion::Spread).is_some() {
         check_prefiltered(field, parts.sampling.rule())?;
     }
-    let is_stored = parts.lighting.is_some_and(|lighting| lighting.light.normals() == Normals::Stored);
-    if is_stored && field.companions(Companion::Gradient).is_none() {
-        return Err(PlanError::NoGradients);
+    let normals = parts.lighting.map_or(Normals::Central, |lighting| lighting.light.normals());
+    match normals.companion() {
+        Some(companion) if field.companions(companion).is_none() => {
+            return Err(PlanError::NoNormals { normals, companion });
+        }
+        _ => {}
     }
     let Drawing::Polygons { back_to_front, .. } = &parts.drawing else { return Ok(()) };
     if parts.rays.placement == Placement::Shells {

@@ -19,7 +19,7 @@ mod transfer_file;
 pub use automatic::{automatic, diagonal_world};
 #[cfg(feature = "color")]
 pub use difference::{ColorDifferences, ColorMetric, PixelCountError, cie_luv};
-pub use light::{Light, LightError, LightSource, LightTerms, LitSides, Normals, Shade, flat_below};
+pub use light::{Light, LightError, LightSource, LightTerms, LitSides, Normals, SURFACE_STEEPNESS, Shade, flat_below};
 pub use narrow_peak::{NarrowPeak, changes_across, narrow_peak, narrow_peak_of};
 pub use opacity::{OPAQUE_DEPTH, alpha, depth, rescale_alpha, transmittance};
 pub use prefiltered::{ValueSpread, expected_optics};

@@ -12,8 +12,8 @@
 //!
 //! Light is white, colours are linear. All of it is continuous in the gradient: a medium without surfaces looks as without light.
 
-use brickfield_core::Optics;
 use brickfield_core::glam::DVec3;
+use brickfield_core::{Companion, Optics};
 
 /// A light: where it comes from, and how surfaces throw it back.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,6 +75,33 @@ pub enum Normals {
     Central,
     /// Gradients that were computed before, and lie beside the samples.
     Stored,
+    /// Normals of surface voxels, which lie beside the samples: of voxels that the transfer function shows, beside transparent ones
+    /// ([`Companion::SurfaceNormal`]). All else is as without light.
+    Surface,
+}
+
+/// The gradient of a surface voxel with [`Normals::Surface`], in units of [`Light::flat_below`]: the strength there is 0.9999, whatever the
+/// values are.
+pub const SURFACE_STEEPNESS: f64 = 64.0;
+
+impl Normals {
+    /// The name in options and messages.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Normals::Central => "central",
+            Normals::Stored => "stored",
+            Normals::Surface => "surface",
+        }
+    }
+
+    /// The companions of samples that they are read from; `None` of differences of values.
+    pub const fn companion(self) -> Option<Companion> {
+        match self {
+            Normals::Central => None,
+            Normals::Stored => Some(Companion::Gradient),
+            Normals::Surface => Some(Companion::SurfaceNormal),
+        }
+    }
 }
 
 /// Numbers that make no light.

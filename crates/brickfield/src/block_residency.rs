@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use brickfield_bricks::{BlockSource, FetchError, SourceId, greatest_gradient, greatest_spread};
+use brickfield_bricks::{
+    BlockSource, FetchError, SourceId, SurfaceEdit, SurfaceNormals, greatest_gradient, greatest_spread,
+};
 use brickfield_core::glam::UVec3;
-use brickfield_core::{BlockLayout, BlockSide, Companion, Level, ValueRange};
+use brickfield_core::{BlockLayout, BlockSide, Companion, Level, TransferFunction, ValueRange};
 use brickfield_frame::{
     BlockPlaces, BlockRanges, BlockRow, BlockSamples, Chunk, Decode, Field, IndexEntry, IndexGrid, IndexLattice, Join,
     Packing, Places, Reach, SampleFormat, Slots,
@@ -23,6 +25,8 @@ use crate::encode::Coding;
 pub struct BlockResidency {
     held: Option<Held>,
     copied: Copied,
+    /// The normals of surface voxels, while frames ask for them, and the work that the last frame made.
+    surface: Option<(SurfaceNormals, SurfaceEdit)>,
 }
 
 /// The blocks of a source, at some levels.
@@ -76,6 +80,11 @@ impl BlockResidency {
         self.copied
     }
 
+    /// The work that the transfer function of the last frame made of the normals of surface voxels; `None` if the frame has none.
+    pub fn surface_edit(&self) -> Option<&SurfaceEdit> {
+        self.surface.as_ref().map(|(_, edit)| edit)
+    }
+
     /// Texels of the texture that hold no sample.
     pub fn n_free_texels(&self) -> u64 {
         self.held.as_ref().map_or(0, |held| match &held.arrangement {
@@ -84,12 +93,14 @@ impl BlockResidency {
         })
     }
 
-    /// Fetches the blocks that have another level than before, with the companions that are asked for; others are let go.
+    /// Fetches the blocks that have another level than before, with the companions that are asked for; others are let go. The normals of
+    /// surface voxels are those of the transfer function.
     pub(crate) fn hold(
         &mut self,
         source: &dyn BlockSource,
         levels: &[Level],
         companions: &[Companion],
+        transfer: &TransferFunction,
     ) -> Result<(), FetchError> {
         self.copied = Copied::default();
         let dense = dense_texels(source.layout(), levels);
@@ -101,9 +112,18 @@ impl BlockResidency {
         let coding = coding_of(source);
         let fetched: Vec<Vec<u8>> =
             new.par_iter().map(|i| fetch(source, &coding, *i, levels[*i])).collect::<Result<_, _>>()?;
+        let surface = match companions.contains(&Companion::SurfaceNormal) {
+            true => Some(self.surface_after(source, transfer)?),
+            false => None,
+        };
         let beside = companions.iter().map(|companion| {
             let is_held = before.is_some_and(|held| held.companions.contains_key(companion));
-            FetchedCompanions::fetch(source, *companion, if is_held { new.clone() } else { all(levels) }, levels)
+            let blocks = match (is_held, companion, &surface) {
+                (false, ..) => all(levels),
+                (true, Companion::SurfaceNormal, Some((_, edit))) => merged(&new, &edit.changed),
+                (true, ..) => new.clone(),
+            };
+            FetchedCompanions::fetch(source, *companion, blocks, (levels, surface.as_ref()))
         });
         let beside: Vec<FetchedCompanions> = beside.collect::<Result<_, _>>()?;
         self.copied = copied(&new, &fetched, &beside);
@@ -119,7 +139,20 @@ impl BlockResidency {
             held.pack_anew(source.layout());
         }
         self.held = Some(held);
+        self.surface = surface;
         Ok(())
+    }
+
+    /// The normals of surface voxels under a transfer function.
+    fn surface_after(
+        &self,
+        source: &dyn BlockSource,
+        transfer: &TransferFunction,
+    ) -> Result<(SurfaceNormals, SurfaceEdit), FetchError> {
+        match &self.surface {
+            Some((before, _)) => before.after(source, transfer),
+            None => SurfaceNormals::none(source).after(source, transfer),
+        }
     }
 
     /// The field of the held blocks, of which some are drawn: with the index and the slots of the last one, where they are the same.
@@ -285,6 +318,14 @@ fn all(levels: &[Level]) -> Vec<usize> {
     (0..levels.len()).collect()
 }
 
+/// The blocks of both lists, each once.
+fn merged(one: &[usize], other: &[usize]) -> Vec<usize> {
+    let mut blocks = [one, other].concat();
+    blocks.sort_unstable();
+    blocks.dedup();
+    blocks
+}
+
 fn copied(new: &[usize], fetched: &[Vec<u8>], beside: &[FetchedCompanions]) -> Copied {
     let n_bytes = |bytes: &[Vec<u8>]| bytes.iter().map(Vec::len).sum::<usize>();
     Copied {
@@ -305,11 +346,14 @@ impl FetchedCompanions {
         source: &dyn BlockSource,
         companion: Companion,
         blocks: Vec<usize>,
-        levels: &[Level],
+        (levels, surface): (&[Level], Option<&(SurfaceNormals, SurfaceEdit)>),
     ) -> Result<FetchedCompanions, FetchError> {
         let fetch = |i: &usize| {
-            let mut bytes = Vec::new();
-            source.fetch_companion(companion, source.layout().block(*i), levels[*i], &mut bytes).map(|()| bytes)
+            let (block, level, mut bytes) = (source.layout().block(*i), levels[*i], Vec::new());
+            match (companion, surface) {
+                (Companion::SurfaceNormal, Some((normals, _))) => normals.codes(block, level),
+                _ => source.fetch_companion(companion, block, level, &mut bytes).map(|()| bytes),
+            }
         };
         let bytes = blocks.par_iter().map(fetch).collect::<Result<_, _>>()?;
         Ok(FetchedCompanions { companion, blocks, bytes })
@@ -326,6 +370,8 @@ impl HeldCompanions {
         let (format, decode) = match companion {
             Companion::Spread => (SampleFormat::Unorm8, Decode { scale: greatest_spread(source), offset: 0.0 }),
             Companion::Gradient => (SampleFormat::Unorm8x4, Decode { scale: greatest_gradient(source), offset: 0.0 }),
+            // The light says what a length of 1 stands for.
+            Companion::SurfaceNormal => (SampleFormat::Unorm8x4, Decode { scale: 1.0, offset: 0.0 }),
         };
         let slots = field.slots().companions(format, decode, self.chunks.clone(), self.ones.clone());
         let slots = slots.expect("companions fill the places of samples");
@@ -398,7 +444,7 @@ fn fetch(source: &dyn BlockSource, coding: &Coding, ordinal: usize, level: Level
 mod tests {
     use brickfield_bricks::{BlockOptions, BlockVolume, NoCompanion, build_blocks};
     use brickfield_core::glam::DVec3;
-    use brickfield_core::{Grid, Rescale, ScalarType, Volume};
+    use brickfield_core::{Grid, Knot, Rescale, ScalarType, Volume};
     use proptest::prelude::*;
 
     use super::*;
@@ -411,8 +457,14 @@ mod tests {
         build_blocks(volume, &BlockOptions { side: BlockSide::V8, ..BlockOptions::default() }).unwrap()
     }
 
+    /// Values up to one are transparent.
+    fn transfer(outside: f64) -> TransferFunction {
+        let knot = |value, extinction| Knot { value, extinction, color: [1.0; 3] };
+        TransferFunction::new(vec![knot(outside, 0.0), knot(65535.0, 1.0)]).unwrap()
+    }
+
     fn field(residency: &mut BlockResidency, source: &dyn BlockSource, levels: &[Level], asked: &[Companion]) -> Field {
-        residency.hold(source, levels, asked).unwrap();
+        residency.hold(source, levels, asked, &transfer(0.0)).unwrap();
         residency.field(source, vec![true; levels.len()], Join::Shared)
     }
 
@@ -455,6 +507,36 @@ mod tests {
         let levels = vec![Level(0); source.layout().n_blocks_total()];
         let field = field(&mut BlockResidency::default(), &source, &levels, &[]);
         assert_eq!(field.dense_level(), None);
+    }
+
+    #[test]
+    fn an_edit_brings_the_surface_normals_that_it_changes() {
+        // Values rise along x: each edit moves the surface.
+        let grid = Grid::axis_aligned(UVec3::new(40, 16, 8), DVec3::ONE).unwrap();
+        let voxels: Vec<u16> = (0..grid.n_voxels()).map(|i| 100 * (i % 40) as u16).collect();
+        let volume = Arc::new(Volume::new(grid, voxels).unwrap());
+        let source = build_blocks(volume, &BlockOptions { side: BlockSide::V8, ..BlockOptions::default() }).unwrap();
+        let levels: Vec<Level> = (0..10).map(|i| Level(i % 2)).collect();
+        let mut residency = BlockResidency::default();
+        let mut after = |outside: f64, asked: &[Companion]| {
+            residency.hold(&source, &levels, asked, &transfer(outside)).unwrap();
+            let field = residency.field(&source, vec![true; 10], Join::Shared);
+            let slots = field.companions(Companion::SurfaceNormal).cloned();
+            let ids: Option<Vec<_>> = slots.map(|slots| slots.all_samples().iter().flatten().map(|c| c.id()).collect());
+            (ids, residency.copied().n_bricks, residency.surface_edit().cloned())
+        };
+        let asked = [Companion::SurfaceNormal];
+        let (first, _, _) = after(1800.0, &asked);
+        // Voxels 18 and 19 along x become transparent: all within the third of five blocks.
+        let (second, n_copied, edit) = after(2000.0, &asked);
+        let (first, second, edit) = (first.unwrap(), second.unwrap(), edit.unwrap());
+        assert_eq!((n_copied, edit.changed.clone()), (2, vec![2, 7]));
+        let others: Vec<usize> = (0..10).filter(|i| first[*i] != second[*i]).collect();
+        assert_eq!(others, [2, 7]);
+        let (again, n_copied, _) = after(2000.0, &asked);
+        assert_eq!((again.unwrap(), n_copied), (second, 0));
+        let (none, _, edit) = after(2000.0, &[]);
+        assert!(none.is_none() && edit.is_none());
     }
 
     /// The content, first texel and size of every block that has texels.
@@ -551,7 +633,7 @@ mod tests {
         let (source, mut residency) = (blocks(), BlockResidency::default());
         let levels = vec![Level(1); 18];
         for n_drawn in [18, 5, 5, 11] {
-            residency.hold(&source, &levels, &[]).unwrap();
+            residency.hold(&source, &levels, &[], &transfer(0.0)).unwrap();
             let drawn: Vec<bool> = (0..18).map(|i| i < n_drawn).collect();
             let field = residency.field(&source, drawn.clone(), Join::Shared);
             let is_there = |block| matches!(field.index().at(block), IndexEntry::Resident { .. });
@@ -594,7 +676,7 @@ mod tests {
         let (source, mut residency) = (Plain(blocks()), BlockResidency::default());
         let levels = vec![Level(1); source.layout().n_blocks_total()];
         let before = field(&mut residency, &source, &levels, &[]);
-        let error = residency.hold(&source, &levels, &[Companion::Spread]).unwrap_err();
+        let error = residency.hold(&source, &levels, &[Companion::Spread], &transfer(0.0)).unwrap_err();
         let cause = error.cause.downcast_ref::<NoCompanion>().unwrap();
         assert!(cause.to_string().starts_with("the source has values alone, and no spreads"), "{cause}");
         assert_eq!(field(&mut residency, &source, &levels, &[]), before);

@@ -6,7 +6,6 @@ use brickfield_core::{Aabb, BlockLayout, BlockSide, Companion, Level, Projection
 use brickfield_frame::{
     Drawing, FramePlan, IndexEntry, Join, Lighting, PlanError, PlanParts, QuadratureRule, SampleFormat, Slices,
 };
-use brickfield_optics::Normals;
 use rayon::prelude::*;
 
 use crate::course::{Course, segment_reach, to_sample_space};
@@ -91,7 +90,7 @@ pub fn prepare_blocks(
     let Course { domain, sampling, rays } = Course::new(source.grid(), scene, coarsest)?;
     let is_coarse = coarsest > Level(0);
     let companions = companions(scene, style.classification).filter(|c| is_coarse || *c != Companion::Spread);
-    residency.hold(source, levels, &companions.collect::<Vec<_>>())?;
+    residency.hold(source, levels, &companions.collect::<Vec<_>>(), &scene.transfer)?;
     let style = match scene.quality {
         Quality::Final => style,
         Quality::Draft => BlockStyle { join: Join::Shared, ..style },
@@ -119,10 +118,10 @@ pub fn sample_bytes(source: &dyn BlockSource, scene: &Scene, classification: Cla
 /// The companions of samples that a frame needs. Where all values look alike, spreads change nothing; nor where all samples are voxels.
 fn companions(scene: &Scene, classification: Classification) -> impl Iterator<Item = Companion> {
     let is_prefiltered = classification == Classification::Prefiltered && scene.transfer.knots().len() > 1;
-    let has_stored_normals = scene.light.is_some_and(|light| light.normals() == Normals::Stored);
+    let of_normals = scene.light.and_then(|light| light.normals().companion());
     Companion::ALL.into_iter().filter(move |companion| match companion {
         Companion::Spread => is_prefiltered,
-        Companion::Gradient => has_stored_normals,
+        Companion::Gradient | Companion::SurfaceNormal => of_normals == Some(*companion),
     })
 }
 
@@ -222,7 +221,7 @@ mod tests {
     use brickfield_core::glam::{DVec3, UVec2};
     use brickfield_core::{Camera, Grid, Interblock, Knot, Volume};
     use brickfield_frame::Feature;
-    use brickfield_optics::{Light, LightSource, LightTerms};
+    use brickfield_optics::{Light, LightSource, LightTerms, Normals};
     use proptest::prelude::*;
 
     use super::*;
@@ -279,7 +278,10 @@ mod tests {
         assert_eq!(sample_bytes(&source, &on(Normals::Stored), Classification::Prefiltered), 7);
         let tree = build_tree(source.volume(), &BuildOptions::default()).unwrap();
         let refused = crate::prepare(&tree, &on(Normals::Stored), &mut crate::Residency::default());
-        assert_eq!(refused.err(), Some(PrepareError::Plan(PlanError::NoGradients)));
+        assert_eq!(
+            refused.err(),
+            Some(PrepareError::Plan(PlanError::NoNormals { normals: Normals::Stored, companion: Companion::Gradient }))
+        );
     }
 
     #[test]

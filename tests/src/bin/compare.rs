@@ -7,6 +7,7 @@ use brickfield_conformance::lamar::{LamarArgs, lamar};
 use brickfield_conformance::left_out::{LeftOutArgs, left_out};
 use brickfield_conformance::ljung::{LjungArgs, ljung};
 use brickfield_conformance::report::{Report, absences, table};
+use brickfield_conformance::saladi::{SaladiArgs, saladi};
 use brickfield_conformance::tong::{TongArgs, tong};
 use clap::Parser;
 
@@ -41,6 +42,10 @@ fn of_paper(paper: &str) -> ExitCode {
         "ljung" => {
             let args = LjungArgs::parse();
             (ljung(&args), args.common.check)
+        }
+        "saladi" => {
+            let args = SaladiArgs::parse();
+            (saladi(&args), args.common.check)
         }
         "tong" => {
             let args = TongArgs::parse();

@@ -23,6 +23,7 @@ mod samples;
 mod self_check;
 pub mod shader_mutants;
 mod storage;
+mod surface_normals;
 mod surfaces;
 
 pub use ahead::for_each_prepared;

@@ -3,12 +3,14 @@
 use std::sync::Arc;
 
 use brickfield::frame::{
-    Chunk, Chunked, Decode, Feature, FramePlan, IndexEntry, IndexGrid, KeptBoxes, Mode, ProxyCorner, ProxyGeometry,
-    Reach, SampleFormat, Sampling, Slots, SpoiltPlan,
+    BlockPlaces, Chunk, Chunked, Decode, Feature, FramePlan, IndexEntry, IndexGrid, KeptBoxes, Mode, Places,
+    ProxyCorner, ProxyGeometry, Reach, SampleFormat, Sampling, Slots, SpoiltPlan,
 };
 use brickfield_core::glam::{DVec3, UVec3, Vec3Swizzles};
-use brickfield_core::{Aabb, Knot, TransferFunction};
+use brickfield_core::{Aabb, Companion, Knot, Level, TransferFunction};
 use brickfield_optics::{Light, LightSource, LightTerms, QuadratureRule};
+
+use super::surface_normals::{NormalRule, Values};
 
 /// One thing wrong with a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -91,11 +93,19 @@ pub enum PlanMutant {
     DiffuseDimmed,
     /// A light that is elsewhere than the eye has x and y swapped.
     LightTurned,
+    /// Normals of surface voxels point from the outside to them.
+    SurfaceTurned,
+    /// Voxels that are none of a surface have a normal along x.
+    SurfaceEverywhere,
+    /// Of the neighbours of a voxel only the six that share a face are asked for a normal.
+    SurfaceOfSix,
+    /// All outside neighbours of a voxel count alike.
+    SurfaceUnweighted,
 }
 
 impl PlanMutant {
     /// All plan mutants.
-    pub const ALL: [PlanMutant; 39] = [
+    pub const ALL: [PlanMutant; 43] = [
         PlanMutant::AnchorHalfVoxel,
         PlanMutant::PixelCorner,
         PlanMutant::RowsFlipped,
@@ -135,6 +145,10 @@ impl PlanMutant {
         PlanMutant::FlatBelowScaled,
         PlanMutant::DiffuseDimmed,
         PlanMutant::LightTurned,
+        PlanMutant::SurfaceTurned,
+        PlanMutant::SurfaceEverywhere,
+        PlanMutant::SurfaceOfSix,
+        PlanMutant::SurfaceUnweighted,
     ];
 
     /// The mutant's name in reports.
@@ -179,6 +193,10 @@ impl PlanMutant {
             PlanMutant::FlatBelowScaled => "plan/flat-below-scaled",
             PlanMutant::DiffuseDimmed => "plan/diffuse-dimmed",
             PlanMutant::LightTurned => "plan/light-turned",
+            PlanMutant::SurfaceTurned => "plan/surface-turned",
+            PlanMutant::SurfaceEverywhere => "plan/surface-everywhere",
+            PlanMutant::SurfaceOfSix => "plan/surface-of-six",
+            PlanMutant::SurfaceUnweighted => "plan/surface-unweighted",
         }
     }
 
@@ -267,6 +285,12 @@ impl PlanMutant {
                 };
                 (source, light.terms(), light.flat_below())
             }),
+            PlanMutant::SurfaceTurned => edit_normals(plan, |_, [x, y, z, length]| [254 - x, 254 - y, 254 - z, length]),
+            PlanMutant::SurfaceEverywhere => {
+                edit_normals(plan, |_, code| if code[3] == 0 { [254, 127, 127, 255] } else { code });
+            }
+            PlanMutant::SurfaceOfSix => recompute_normals(plan, NormalRule::OfSix),
+            PlanMutant::SurfaceUnweighted => recompute_normals(plan, NormalRule::Unweighted),
         }
     }
 }
@@ -275,7 +299,54 @@ fn relight(plan: &mut SpoiltPlan, change: impl Fn(&Light) -> (LightSource, Light
     let Some(lighting) = &mut plan.lighting else { return };
     let (source, terms, flat_below) = change(&lighting.light);
     let light = Light::new(source, terms, flat_below).expect("a mutant's light is one");
-    lighting.light = light.on_sides(lighting.light.sides());
+    lighting.light = light.on_sides(lighting.light.sides()).on_normals(lighting.light.normals());
+}
+
+/// Other normals of surface voxels: of each sample, by its block and its place in it.
+fn edit_normals(plan: &mut SpoiltPlan, edit: impl Fn((u32, usize), [u8; 4]) -> [u8; 4]) {
+    let Some(normals) = plan.companions[Companion::SurfaceNormal as usize].take() else { return };
+    let edited = |slot: u32, bytes: &[u8]| -> Vec<u8> {
+        let codes = bytes.as_chunks().0.iter().enumerate();
+        codes.flat_map(|(i, code)| edit((slot, i), *code)).collect()
+    };
+    let slots = 0..normals.n_slots();
+    let chunk = |slot: u32| Some(Arc::new(Chunk::new(edited(slot, normals.samples(slot)?.bytes()))));
+    let one = |slot: u32| match normals.samples(slot) {
+        Some(_) => 0,
+        None => {
+            u32::from_le_bytes(edit((slot, 0), (normals.one_sample(slot).unwrap_or_default() as u32).to_le_bytes()))
+        }
+    };
+    let (chunks, ones) = (slots.clone().map(chunk).collect(), slots.map(one).collect());
+    let edited = plan.slots.companions(normals.format(), normals.decode(), chunks, ones);
+    plan.companions[Companion::SurfaceNormal as usize] = Some(Arc::new(edited.expect("as many as before")));
+}
+
+/// Normals by another rule, of a plan all of whose blocks are at level 0; of other plans they stay.
+fn recompute_normals(plan: &mut SpoiltPlan, rule: NormalRule) {
+    let (Places::Blocks(places), Some(lighting)) = (plan.slots.places().clone(), plan.lighting) else { return };
+    if places.rows().iter().any(|row| row.level != Level(0)) {
+        return;
+    }
+    let mut values = vec![0.0; plan.dims.element_product() as usize];
+    for slot in 0..plan.slots.n_slots() {
+        let Some(chunk) = plan.slots.samples(slot) else { continue };
+        for i in 0..chunk.bytes().len() / plan.slots.format().n_bytes() {
+            values[voxel_of(&places, slot, i)] = plan.slots.decode().value(plan.slots.format().read(chunk.bytes(), i));
+        }
+    }
+    let transfer = plan.transfer.clone();
+    let codes = Values { values, dims: plan.dims, spacing: lighting.spacing(), transfer: &transfer }.codes(rule);
+    edit_normals(plan, |(slot, i), _| codes[voxel_of(&places, slot, i)]);
+}
+
+/// The number of a voxel, x fastest, by its block and its place in it.
+fn voxel_of(places: &BlockPlaces, slot: u32, i: usize) -> usize {
+    let layout = places.layout();
+    let block = layout.block(slot as usize);
+    let (first, n, i) = (layout.first_voxel(block), layout.extent(block), i as u32);
+    let p = first + UVec3::new(i % n.x, i / n.x % n.y, i / (n.x * n.y));
+    (p.x + layout.dims().x * (p.y + layout.dims().y * p.z)) as usize
 }
 
 fn edit_triangles(plan: &mut SpoiltPlan, edit: impl Fn(&[ProxyCorner], &mut [[u32; 3]])) {

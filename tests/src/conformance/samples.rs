@@ -26,26 +26,38 @@ pub(crate) struct PlanSamples<'a>(pub(crate) &'a FramePlan);
 impl Corners {
     /// The trilinear value: the weighted sum of the corners.
     pub(crate) fn value(&self) -> f64 {
-        let weight =
-            |axis: usize, c: usize| if c >> axis & 1 == 1 { self.fraction[axis] } else { 1.0 - self.fraction[axis] };
-        self.values.iter().enumerate().map(|(c, v)| v * weight(0, c) * weight(1, c) * weight(2, c)).sum()
+        self.values.iter().enumerate().map(|(c, v)| v * weight(self.fraction, c)).sum()
     }
 }
 
 impl Samples for VolumeSamples<'_> {
     fn around(&self, q: DVec3) -> Option<Corners> {
-        let dims = self.0.grid().dims();
-        let last = (dims - 1).as_dvec3();
-        let q = q.clamp(DVec3::ZERO, last);
-        let low = q.floor().min((last - 1.0).max(DVec3::ZERO));
-        let corner =
-            |c: usize| (low.as_uvec3() + UVec3::new(c as u32 & 1, c as u32 >> 1 & 1, c as u32 >> 2)).min(dims - 1);
-        let value = |c: usize| {
-            let p = corner(c);
-            self.0.value(p.x as usize + dims.x as usize * (p.y as usize + dims.y as usize * p.z as usize))
-        };
-        Some(Corners { values: std::array::from_fn(value), fraction: q - low })
+        let (voxels, fraction) = voxels_around(self.0.grid().dims(), q);
+        Some(Corners { values: voxels.map(|i| self.0.value(i)), fraction })
     }
+}
+
+/// The voxels around a position in a volume, and where it lies between them.
+fn voxels_around(dims: UVec3, q: DVec3) -> ([usize; 8], DVec3) {
+    let last = (dims - 1).as_dvec3();
+    let q = q.clamp(DVec3::ZERO, last);
+    let low = q.floor().min((last - 1.0).max(DVec3::ZERO));
+    let voxel = |c: usize| {
+        let p = (low.as_uvec3() + UVec3::new(c as u32 & 1, c as u32 >> 1 & 1, c as u32 >> 2)).min(dims - 1);
+        p.x as usize + dims.x as usize * (p.y as usize + dims.y as usize * p.z as usize)
+    };
+    (std::array::from_fn(voxel), q - low)
+}
+
+/// The voxels around a position in a volume, each with its trilinear weight.
+pub(crate) fn weights_around(dims: UVec3, q: DVec3) -> [(usize, f64); 8] {
+    let (voxels, fraction) = voxels_around(dims, q);
+    std::array::from_fn(|c| (voxels[c], weight(fraction, c)))
+}
+
+/// The trilinear weight of a corner.
+fn weight(fraction: DVec3, corner: usize) -> f64 {
+    (0..3).map(|axis| if corner >> axis & 1 == 1 { fraction[axis] } else { 1.0 - fraction[axis] }).product()
 }
 
 impl Samples for PlanSamples<'_> {

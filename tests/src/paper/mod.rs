@@ -62,6 +62,8 @@ pub enum Paper {
     Lamar,
     /// Ljung, Lundstroem and Ynnerman 2006: multiresolution interblock interpolation in direct volume rendering.
     Ljung,
+    /// Saladi, Pinnamaneni and Meyer 2003: wavelets and textures with illumination for web-based volume rendering.
+    Saladi,
     /// Tong, Wang, Tsang and Tang 1999: efficiently rendering large volume data using texture mapping hardware.
     Tong,
 }

@@ -39,12 +39,15 @@ pub(super) fn gradient_codes<T: Scalar>(
     sums.into_iter().flat_map(|(sum, count)| code(sum / f64::from(count))).collect()
 }
 
+/// No gradient, as four bytes.
+pub(super) const NO_GRADIENT: [u8; 4] = [GRADIENT_ZERO, GRADIENT_ZERO, GRADIENT_ZERO, 0];
+
 /// A gradient along the grid's axes, in parts of the greatest, as four bytes.
-fn code(gradient: DVec3) -> [u8; 4] {
+pub(super) fn code(gradient: DVec3) -> [u8; 4] {
     let length = gradient.length();
     // Neither has a direction: no gradient, and where all values are equal, 0 of 0.
     if length.is_nan() || length == 0.0 {
-        return [GRADIENT_ZERO, GRADIENT_ZERO, GRADIENT_ZERO, 0];
+        return NO_GRADIENT;
     }
     let zero = f64::from(GRADIENT_ZERO);
     let [x, y, z] = (gradient / length).to_array().map(|c| (c * zero + zero).round() as u8);
@@ -52,15 +55,15 @@ fn code(gradient: DVec3) -> [u8; 4] {
 }
 
 /// The data values of a block's voxels and one beyond on every side: at the volume's faces the outer voxels again.
-struct Around {
-    values: Vec<f64>,
+pub(super) struct Around {
+    pub(super) values: Vec<f64>,
     n: UVec3,
     /// Distance between the voxels before and behind each voxel of the block along an axis: 2, 1 at the volume's faces, 0 if there is none.
     distances: [Vec<f64>; 3],
 }
 
 impl Around {
-    fn of<T: Scalar>(Voxels { voxels, grid, rescale }: Voxels<T>, first: UVec3, extent: UVec3) -> Around {
+    pub(super) fn of<T: Scalar>(Voxels { voxels, grid, rescale }: Voxels<T>, first: UVec3, extent: UVec3) -> Around {
         let (dims, n) = (grid.dims(), extent + 2);
         let beside = |axis: usize, i: u32| (first[axis] + i).saturating_sub(1).min(dims[axis] - 1);
         let value = |p: UVec3| {

@@ -3,10 +3,12 @@
 mod build;
 mod gradient;
 mod memory;
+mod outside;
 mod shrink;
 mod source;
 mod spread;
 mod summary;
+mod surface;
 mod volume;
 
 use brickfield_core::glam::UVec3;
@@ -16,6 +18,7 @@ pub use memory::{BlockMemory, BlockTally, block_memory};
 pub use source::{
     BlockSource, FetchError, NoCompanion, NoSuchBlock, SourceId, fetch_values, greatest_gradient, greatest_spread,
 };
+pub use surface::{SurfaceEdit, SurfaceNormals};
 pub use volume::BlockVolume;
 
 /// All positions of a box of so many samples, x fastest.

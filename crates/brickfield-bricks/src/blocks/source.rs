@@ -43,7 +43,8 @@ pub trait BlockSource: Sync {
     /// Replaces `out` with the companions of a block's samples, in the order of [`fetch`](Self::fetch): [`Companion::n_bytes`] each.
     ///
     /// # Errors
-    /// As `fetch`; a source that has no such companions, which is what this method says of every source that does not define it.
+    /// As `fetch`; a source that has no such companions, which is what this method says of every source that does not define it; surface
+    /// normals, which belong to a transfer function, too ([`SurfaceNormals`](crate::SurfaceNormals)).
     fn fetch_companion(
         &self,
         companion: Companion,
@@ -53,6 +54,17 @@ pub trait BlockSource: Sync {
     ) -> Result<(), FetchError> {
         FetchError::unless_exists(self.layout(), block, level)?;
         Err(FetchError::new(block, level, NoCompanion { companion }))
+    }
+
+    /// Replaces `out` with the data values of a block's voxels and of those around it, one beyond on every side: extent + 2 along each axis,
+    /// x fastest. Beyond the volume's faces its outer voxels are repeated. [`SurfaceNormals`](crate::SurfaceNormals) are made of them.
+    ///
+    /// # Errors
+    /// As `fetch`; a source of values alone, which is what this method says of every source that does not define it: it would be asked
+    /// for the whole volume at full resolution.
+    fn fetch_around(&self, block: UVec3, _out: &mut Vec<f64>) -> Result<(), FetchError> {
+        FetchError::unless_exists(self.layout(), block, Level(0))?;
+        Err(FetchError::new(block, Level(0), NoCompanion { companion: Companion::SurfaceNormal }))
     }
 }
 

@@ -7,9 +7,9 @@ use brickfield_core::{
     BlockLayout, BlockSummary, Companion, Grid, Level, Rescale, Scalar, ScalarType, ValueRange, Volume, with_voxels,
 };
 
-use super::gradient::{Voxels, gradient_codes};
+use super::gradient::{Around, Voxels, gradient_codes};
 use super::shrink::BlockVoxels;
-use super::source::{BlockSource, FetchError, SourceId, greatest_gradient};
+use super::source::{BlockSource, FetchError, NoCompanion, SourceId, greatest_gradient};
 use super::spread::spread_codes;
 
 /// A volume as flat blocks of every resolution (Ljung, Lundstroem and Ynnerman 2006, section 3.1).
@@ -125,7 +125,18 @@ impl BlockSource for BlockVolume {
         *out = match companion {
             Companion::Spread => self.spreads(block, level)?,
             Companion::Gradient => self.gradients(block, level)?,
+            Companion::SurfaceNormal => return Err(FetchError::new(block, level, NoCompanion { companion })),
         };
+        Ok(())
+    }
+
+    fn fetch_around(&self, block: UVec3, out: &mut Vec<f64>) -> Result<(), FetchError> {
+        FetchError::unless_exists(&self.layout, block, Level(0))?;
+        let (first, extent) = (self.layout.first_voxel(block), self.layout.extent(block));
+        let (grid, rescale) = (self.volume.grid(), self.rescale());
+        *out = with_voxels!(self.volume.voxels(), voxels => {
+            Around::of(Voxels { voxels, grid, rescale }, first, extent).values
+        });
         Ok(())
     }
 }

@@ -13,7 +13,7 @@
 use brickfield_core::GRADIENT_ZERO;
 use brickfield_core::glam::{DMat3, DVec3};
 use brickfield_frame::{FramePlan, Lighting, PlanRay};
-use brickfield_optics::{LightSource, Shade};
+use brickfield_optics::{LightSource, Normals, SURFACE_STEEPNESS, Shade};
 
 use super::ambiguity::cells;
 use super::field::{Code, FieldReader, Patch, Values};
@@ -155,13 +155,18 @@ fn slope(field: &impl FieldReader, patch: &Patch, p: DVec3) -> DVec3 {
     }
 }
 
-/// A stored gradient in data values per voxel (`brickfield_core::Companion::Gradient`).
+/// A stored gradient in data values per voxel (`brickfield_core::Companion::Gradient`), or that of a surface in the same form
+/// (`Companion::SurfaceNormal`).
 fn stored(field: &impl FieldReader, [x, y, z, length]: [f64; 4]) -> DVec3 {
     let plan = field.plan();
     let (Some(gradients), Some(lighting)) = (plan.gradients(), plan.lighting()) else { return DVec3::ZERO };
     let zero = f64::from(GRADIENT_ZERO);
     let direction = (DVec3::new(x, y, z) * 255.0 - zero) / zero;
-    direction * length * length * gradients.decode().scale * lighting.spacing()
+    let greatest = match lighting.light.normals() {
+        Normals::Surface => SURFACE_STEEPNESS * lighting.light.flat_below(),
+        Normals::Central | Normals::Stored => gradients.decode().scale,
+    };
+    direction * length * length * greatest * lighting.spacing()
 }
 
 /// How far a stored gradient may be off, in data values per voxel: by looking beside the position, and by what each of its numbers may be

@@ -34,11 +34,10 @@ impl<'a> Lamp<'a> {
         let lighting = renderer.plan().lighting()?;
         let (plan, unit) = (renderer.plan(), renderer.plan().value_scale().unit());
         let per_number = unit / lighting.light.flat_below();
-        let greatest = plan.gradients().map_or(0.0, |gradients| gradients.decode().scale / unit);
         Some(Lamp {
             lighting,
             steepness: (lighting.gradient_to_world() * per_number).as_mat3(),
-            greatest_slope: (lighting.spacing() * greatest).as_vec3(),
+            greatest_slope: (lighting.spacing() * (plan.greatest_gradient() / unit)).as_vec3(),
         })
     }
 

@@ -32,10 +32,10 @@ pub struct LightOptions {
     /// The sides of surfaces that are lit: lower (of lower values) or both
     #[arg(long, value_name = "WHICH", requires = "light", default_value = "lower", value_parser = values::lit_sides)]
     pub lit_sides: LitSides,
-    /// Normals of surfaces: central (differences of values) or stored (gradients computed before, four bytes a sample more; with
-    /// --blocks)
-    #[arg(long, value_name = "WHICH", requires = "light", requires_if("stored", "blocks"), default_value = "central",
-          value_parser = values::normals)]
+    /// Normals of surfaces: central (differences of values), stored (gradients computed before) or surface (of voxels that are seen beside
+    /// transparent ones; all else is as without light). The last two take four bytes a sample more, and --blocks
+    #[arg(long, value_name = "WHICH", requires = "light", requires_ifs([("stored", "blocks"), ("surface", "blocks")]),
+          default_value = "central", value_parser = values::normals)]
     pub normals: Normals,
 }
 

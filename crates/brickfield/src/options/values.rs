@@ -96,7 +96,7 @@ pub fn lit_sides(text: &str) -> Result<LitSides, String> {
 
 /// Where normals come from.
 pub fn normals(text: &str) -> Result<Normals, String> {
-    named(&[("central", Normals::Central), ("stored", Normals::Stored)], text)
+    named(&[Normals::Central, Normals::Stored, Normals::Surface].map(|normals| (normals.name(), normals)), text)
 }
 
 /// How the samples of a store are coded.

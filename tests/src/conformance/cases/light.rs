@@ -57,7 +57,7 @@ fn random(setup: Setup, side: BlockSide, join: Join) -> Setup {
 }
 
 pub(super) fn cases() -> Vec<Case> {
-    [bricks(), levels(), blocks(), stored(), extremes()].into_iter().flatten().collect()
+    [bricks(), levels(), blocks(), stored(), surface(), extremes()].into_iter().flatten().collect()
 }
 
 fn bricks() -> Vec<Case> {
@@ -266,6 +266,76 @@ fn stored() -> Vec<Case> {
         }),
         picture("light/stored-fast", catches![RedBlueSwapped, RowsFlipped], move || {
             equal(lit(f32, LightSource::Head), 0).with(|s| s.mode = Mode::FAST)
+        }),
+    ]
+}
+
+/// Normals of surface voxels.
+fn surface() -> Vec<Case> {
+    let (u8, u16, f32) = (ScalarType::U8, ScalarType::U16, ScalarType::F32);
+    use Interblock::{BoundarySplit, MaximumDistance};
+    // Nothing below a third: outside and inside of a shell.
+    let transfer = |scalar| {
+        let knots = [knot(0.33, 0.0, WARM), knot(0.4, 0.25, WARM), knot(0.8, 0.6, COOL)];
+        spread(&knots, scalar).expect("knots ascend")
+    };
+    let of = move |grid: Grid, scalar| {
+        let setup = Setup::new(shell(&grid, scalar), transfer(scalar));
+        setup.lit(beside(&grid), SHINY).surface_normals()
+    };
+    let equal = |setup: Setup, level| {
+        let style = BlockStyle {
+            join: Join::Blend(MaximumDistance),
+            transparent: TransparentBlocks::Blended,
+            ..BlockStyle::default()
+        };
+        setup.blocks(BlockSide::V8, FlatLevels::All(Level(level)), style)
+    };
+    vec![
+        // The volume's own voxels know of these.
+        picture("light/surface-equal-skew", catches![SurfaceTurned, SurfaceOfSix, SurfaceUnweighted], move || {
+            equal(of(skew_grid(), u16), 0)
+        }),
+        picture(
+            "light/surface-equal-gauss2-parallel",
+            catches![SurfaceEverywhere, SurfaceUnweighted, shader::STORED_DIRECTION_UNSIGNED, LightTurned],
+            move || {
+                let setup = of(grid(), u8).rule(QuadratureRule::Gauss2);
+                equal(setup.parallel(DVec3::new(-0.5, 0.8, -0.3), 40.0), 0)
+            },
+        ),
+        // A jump down: the values above are outside, too, and the knot of the jump is.
+        picture("light/surface-both-sides-of-a-band", catches![SurfaceTurned, SurfaceOfSix], move || {
+            let knots = [knot(0.3, 0.0, WARM), knot(0.4, 0.4, WARM), knot(0.8, 0.4, COOL), knot(0.8, 0.0, COOL)];
+            let transfer = spread(&knots, u8).expect("knots ascend");
+            let setup = Setup::new(hills(&grid(), u8), transfer).lit(beside(&grid()), SHINY).surface_normals();
+            equal(setup, 0)
+        }),
+        picture(
+            "light/surface-maximum-distance",
+            catches![shader::ONE_GRADIENT_FORGOTTEN, shader::STORED_LENGTH_NOT_SQUARED, SurfaceTurned],
+            move || random(of(grid(), u8), BlockSide::V8, Join::Blend(MaximumDistance)),
+        ),
+        picture(
+            "light/surface-boundary-split-skew-pre-integrated",
+            catches![shader::STORED_ACROSS_BLOCKS, shader::NORMAL_OF_THE_GRID, SurfaceEverywhere],
+            move || {
+                let setup = of(skew_grid(), f32).rule(QuadratureRule::PreIntegrated);
+                random(setup, BlockSide::V16, Join::Blend(BoundarySplit))
+            },
+        ),
+        picture("light/surface-nearest", catches![SurfaceEverywhere, shader::LIGHT_FROM_BEHIND], move || {
+            random(of(grid(), u16), BlockSide::V8, Join::Shared)
+        }),
+        picture("light/surface-all-of-level-1-polygons", catches![SurfaceTurned, DiffuseDimmed], move || {
+            let setup = of(skew_grid(), u8).with(|s| {
+                (s.division, s.placement) = (Division::Brick, Placement::ViewportPlanes);
+                s.technique = Technique::Polygons(Target::Float32);
+            });
+            equal(setup, 1)
+        }),
+        picture("light/surface-fast", catches![RedBlueSwapped, SurfaceTurned], move || {
+            equal(of(grid(), u8), 0).with(|s| s.mode = Mode::FAST)
         }),
     ]
 }

@@ -128,6 +128,11 @@ impl Setup {
         Setup { oracle: OracleKind::None, ..setup }
     }
 
+    /// On normals of surface voxels; for flat blocks.
+    pub(super) fn surface_normals(self) -> Setup {
+        self.with(|s| s.light = s.light.map(|light| light.on_normals(Normals::Surface)))
+    }
+
     /// Surfaces begin at another gradient.
     pub(super) fn flat_below_times(self, factor: f64) -> Setup {
         let scaled = |light: Light| Light::new(light.source(), light.terms(), light.flat_below() * factor);

@@ -90,6 +90,7 @@ fn check_of_store(args: &RenderArgs, blocks: &Blocks) -> Result<(), OptionError>
         _ if blocks.volume().is_some() => return Ok(()),
         (Classification::Prefiltered, _) => "--classify prefiltered",
         (_, Normals::Stored) => "--normals stored",
+        (_, Normals::Surface) => "--normals surface",
         _ => return Ok(()),
     };
     let reason = "it has values alone; read another format, or leave the option out";
@@ -213,7 +214,9 @@ fn block_summary(subject: &BlockSubject, levels: &BlockLevels, residency: &Block
     let slots = plan.field().slots();
     let of = |name: &str, slots: &Arc<Slots>| format!(", {name} {:.2} MiB", mib(slots.n_bytes() as u64));
     let spreads = plan.spreads().map(|spreads| of("spreads", spreads)).unwrap_or_default();
-    let gradients = plan.gradients().map(|gradients| of("gradients", gradients)).unwrap_or_default();
+    let companion = plan.lighting().and_then(|lighting| lighting.light.normals().companion());
+    let name = companion.map_or("", |companion| companion.name());
+    let gradients = plan.gradients().map(|gradients| of(name, gradients)).unwrap_or_default();
     let free = residency.n_free_texels() * slots.format().n_bytes() as u64;
     format!(
         "flat blocks of {}: {}; {:.1}:1\nkept {:.2} MiB{spreads}{gradients}, {:.2} MiB of the texture free; with ghost layers {:.2} MiB (one side), {:.2} MiB (both)\n",

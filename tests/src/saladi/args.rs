@@ -1,0 +1,59 @@
+//! The options of `compare --paper saladi`.
+
+use brickfield::options::values;
+use brickfield_core::BlockSide;
+use clap::{Parser, ValueEnum};
+
+use crate::paper::PaperArgs;
+
+/// Saladi, Pinnamaneni and Meyer 2003 on this project's data
+///
+/// Exit status: 0 done, 1 failed, 2 unusable arguments or no data, 3 a required backend is absent, 4 a claim was missed (--check).
+#[derive(Parser, Clone, Debug)]
+#[command(name = "compare --paper saladi")]
+pub struct SaladiArgs {
+    /// The options that papers share
+    #[command(flatten)]
+    pub common: PaperArgs,
+    /// Parts to run; all by default
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
+    pub part: Vec<Part>,
+    /// Voxels along a side of a flat block: 8, 16 or 32
+    #[arg(long, value_name = "N", default_value = "16", value_parser = values::block_side)]
+    pub blocks: BlockSide,
+    /// Where objects begin, in percent of the range of values
+    #[arg(long, value_name = "PERCENT", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=95))]
+    pub threshold: u32,
+}
+
+/// The parts of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Part {
+    /// Figures 9 and 10: pictures on normals of every kind, and edits of the transfer function
+    Normals,
+    /// Tables 1 and 2: loading, processing without and with light, rendering by the number of slices
+    Tables,
+}
+
+impl Part {
+    /// A heading.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Part::Normals => "Figures 9 and 10: normals of surface voxels",
+            Part::Tables => "Tables 1 and 2: times by the number of slices",
+        }
+    }
+
+    /// Whether it reads real volumes.
+    pub(super) const fn needs_data(self) -> bool {
+        matches!(self, Part::Normals | Part::Tables)
+    }
+}
+
+impl SaladiArgs {
+    /// The parts to be run, each once.
+    pub fn parts(&self) -> Vec<Part> {
+        let all = Part::value_variants().iter().copied();
+        all.filter(|part| self.part.is_empty() || self.part.contains(part)).collect()
+    }
+}
