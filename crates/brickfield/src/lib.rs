@@ -18,6 +18,8 @@ mod trimmed;
 mod viewpoint;
 mod visibility;
 
+#[cfg(feature = "fetch")]
+pub mod delivery;
 #[cfg(feature = "cli")]
 pub mod options;
 #[cfg(feature = "overlay")]

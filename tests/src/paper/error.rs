@@ -50,6 +50,12 @@ pub enum PaperError {
     #[error(transparent)]
     Fetch(#[from] brickfield::bricks::FetchError),
     #[error(transparent)]
+    Delivery(#[from] brickfield::delivery::DeliveryError),
+    #[error(transparent)]
+    Client(#[from] brickfield::fetch::FetchError),
+    #[error(transparent)]
+    Serve(#[from] brickfield::serve::ServeError),
+    #[error(transparent)]
     Shader(#[from] brickfield_shaders::ShaderError),
     #[error("a backend that was there: {source}")]
     Reopen { source: brickfield::BackendError },

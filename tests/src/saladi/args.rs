@@ -33,6 +33,12 @@ pub enum Part {
     Normals,
     /// Tables 1 and 2: loading, processing without and with light, rendering by the number of slices
     Tables,
+    /// Stores with level 0 as details, next to ordinary ones
+    Stores,
+    /// Bytes against error, in several orders
+    Bytes,
+    /// A store that is served over a slow link, and over one that fails
+    Served,
 }
 
 impl Part {
@@ -41,12 +47,18 @@ impl Part {
         match self {
             Part::Normals => "Figures 9 and 10: normals of surface voxels",
             Part::Tables => "Tables 1 and 2: times by the number of slices",
+            Part::Stores => "Stores: level 0 as details of level 1",
+            Part::Bytes => "Progressive delivery: bytes against error",
+            Part::Served => "Progressive delivery: over a slow link, and over one that fails",
         }
     }
 
-    /// Whether it reads real volumes.
-    pub(super) const fn needs_data(self) -> bool {
-        matches!(self, Part::Normals | Part::Tables)
+    /// The volumes that it reads, as paths below the folder of real volumes.
+    pub(super) const fn data(self) -> &'static [&'static str] {
+        match self {
+            Part::Normals | Part::Tables => &super::data::DATA,
+            Part::Stores | Part::Bytes | Part::Served => &super::stores::DATA,
+        }
     }
 }
 

@@ -15,7 +15,7 @@ use super::SaladiArgs;
 use crate::paper::{PaperError, Subject};
 
 /// A computed tomogram and a magnetic resonance image, as in the paper; as paths below the folder of real volumes.
-const DATA: [&str; 2] = ["ct/engine.vti", "mri/spm152.nii.gz"];
+pub(super) const DATA: [&str; 2] = ["ct/engine.vti", "mri/spm152.nii.gz"];
 
 const WARM: LinearRgb = [0.85, 0.55, 0.35];
 const BRIGHT: LinearRgb = [0.95, 0.9, 0.8];
@@ -37,7 +37,7 @@ pub(super) struct DataSet {
 
 /// Whether the data that the parts need are there.
 pub(super) fn check_data(args: &SaladiArgs) -> Result<(), PaperError> {
-    args.common.check_data(&DATA, args.parts().into_iter().any(|part| part.needs_data()))
+    args.parts().into_iter().try_for_each(|part| args.common.check_data(part.data(), true))
 }
 
 /// The names of the volumes that are asked for, and their paths.

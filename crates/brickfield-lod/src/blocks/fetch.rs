@@ -37,8 +37,8 @@ impl FetchItem {
 pub struct FetchOrder {
     /// Items by number, each once: what gains most visible error per byte comes first, then all that no phase asks for.
     pub items: Vec<usize>,
-    /// How many of them a phase asked for: the others change nothing that is seen.
-    pub n_visible: usize,
+    /// For each phase, how many items are fetched at its end. Those behind the last one change nothing that is seen.
+    pub phase_ends: Vec<usize>,
 }
 
 /// Items or weights that are not those of the blocks.
@@ -90,12 +90,13 @@ pub fn fetch_order(
         refined_by: refined_by(items),
         order: Vec::with_capacity(items.len()),
     };
+    let mut phase_ends = Vec::with_capacity(phases.len());
     for weights in phases {
         fetching.run(weights);
+        phase_ends.push(fetching.order.len());
     }
-    let n_visible = fetching.order.len();
     fetching.complete();
-    Ok(FetchOrder { items: fetching.order, n_visible })
+    Ok(FetchOrder { items: fetching.order, phase_ends })
 }
 
 fn check(
@@ -279,23 +280,23 @@ mod tests {
     #[test]
     fn what_is_seen_comes_first_and_the_rest_completes_the_volume() {
         let all = vec![1.0; 2];
-        assert_eq!(order([UNSEEN, SEEN], &[all.clone()]), FetchOrder { items: vec![2, 1, 0], n_visible: 2 });
-        assert_eq!(order([SEEN, UNSEEN], &[all.clone()]), FetchOrder { items: vec![2, 0, 1], n_visible: 2 });
-        assert_eq!(order([UNSEEN, UNSEEN], &[all]), FetchOrder { items: vec![2, 0, 1], n_visible: 0 });
+        assert_eq!(order([UNSEEN, SEEN], &[all.clone()]), FetchOrder { items: vec![2, 1, 0], phase_ends: vec![2] });
+        assert_eq!(order([SEEN, UNSEEN], &[all.clone()]), FetchOrder { items: vec![2, 0, 1], phase_ends: vec![2] });
+        assert_eq!(order([UNSEEN, UNSEEN], &[all]), FetchOrder { items: vec![2, 0, 1], phase_ends: vec![0] });
     }
 
     #[test]
     fn a_region_of_interest_comes_before_what_gains_more() {
         let (much, all) = (SEEN.map(|error| 9.0 * error), vec![1.0; 2]);
         assert_eq!(order([much, SEEN], &[all.clone()]).items, [2, 0, 1]);
-        assert_eq!(order([much, SEEN], &[vec![0.0, 1.0], all]), FetchOrder { items: vec![2, 1, 0], n_visible: 3 });
+        assert_eq!(order([much, SEEN], &[vec![0.0, 1.0], all]), FetchOrder { items: vec![2, 1, 0], phase_ends: vec![2, 3] });
     }
 
     /// Level 1 gains nothing of its own here; details are of no use without it.
     #[test]
     fn what_is_refined_comes_before_what_refines_it() {
         let errors = [[0.0, 5.0, 5.0, 5.0, 5.0, 5.0], UNSEEN];
-        assert_eq!(order(errors, &[vec![1.0; 2]]), FetchOrder { items: vec![2, 0, 1], n_visible: 2 });
+        assert_eq!(order(errors, &[vec![1.0; 2]]), FetchOrder { items: vec![2, 0, 1], phase_ends: vec![2] });
     }
 
     #[test]
@@ -310,7 +311,7 @@ mod tests {
         };
         let items = [item(0, 0, 1, 800), item(0, 1, 2, 800), item(1, 0, 2, 200), item(3, 0, 2, 10)];
         let order = fetch_order(&layout, &[SEEN; 2], &[vec![1.0; 2]], Level(5), &items).unwrap();
-        assert_eq!(order, FetchOrder { items: vec![3, 2, 0, 1], n_visible: 4 });
+        assert_eq!(order, FetchOrder { items: vec![3, 2, 0, 1], phase_ends: vec![4] });
     }
 
     #[test]

@@ -96,19 +96,19 @@ impl Delivery {
     /// What the client or the reader says; a store that `brickfield pack` did not make.
     pub fn begin(location: &str, client: Client, limits: StoreLimits) -> Result<Delivery, DeliveryError> {
         let arrived = Arc::new(Arrived::default());
-        client.fetch_into(&arrived, &[Request::whole(ROOT_DOCUMENT)])?;
+        client.deliver(&[Request::whole(ROOT_DOCUMENT)], &arrived)?;
         let (stated, others) = stated_documents(&whole(&arrived, ROOT_DOCUMENT)?)?;
         for (key, bytes) in &stated {
             arrived.insert_whole(key, bytes)?;
         }
-        client.fetch_into(&arrived, &others.into_iter().map(Request::whole).collect::<Vec<_>>())?;
+        client.deliver(&others.into_iter().map(Request::whole).collect::<Vec<_>>(), &arrived)?;
         let n_bytes_stated: u64 = stated.iter().map(|(_, bytes)| bytes.len() as u64).sum();
         let levels = opened(&arrived, location, limits)?;
         if !levels.is_packed() {
             return Err(DeliveryError::NotPacked { location: location.to_owned() });
         }
         let known = overview_level(&levels);
-        client.fetch_into(&arrived, &requests(levels.whole_level(finest_above(&levels, known))))?;
+        client.deliver(&requests(levels.whole_level(finest_above(&levels, known))), &arrived)?;
         let blocks = StoreBlocks::of_one_level(Path::new(location), levels, SIDE, known)?;
         let levels = vec![known; blocks.layout().n_blocks_total()];
         let n_bytes = arrived.n_arrived_bytes() - n_bytes_stated;
@@ -221,7 +221,7 @@ impl Delivery {
 
     fn fetch_requests(&mut self, requests: &[Request]) -> Result<(), DeliveryError> {
         let before = self.arrived.n_arrived_bytes();
-        let outcome = self.client.fetch_into(&self.arrived, requests);
+        let outcome = self.client.deliver(requests, &self.arrived);
         self.n_bytes += self.arrived.n_arrived_bytes() - before;
         outcome?;
         Ok(())
@@ -239,9 +239,25 @@ impl DeliveryPlan {
         self.n_fetched
     }
 
-    /// The items that the view shows something of: they come first.
+    /// How many items are fetched when the region that was asked for is complete, as far as the view shows it; of a plan without one, all
+    /// that the view shows.
+    pub fn n_of_region(&self) -> usize {
+        self.order.phase_ends.first().copied().unwrap_or(0)
+    }
+
+    /// How many items are fetched when all that the view shows is complete.
     pub fn n_visible(&self) -> usize {
-        self.order.n_visible
+        self.order.phase_ends.last().copied().unwrap_or(0)
+    }
+
+    /// The plan of an ordinary pyramid, for comparison: level by level, each in the order of its chunks, whatever a view shows.
+    #[must_use]
+    pub fn level_by_level(mut self) -> DeliveryPlan {
+        let mut items: Vec<usize> = (0..self.items.len()).collect();
+        items.sort_by_key(|item| std::cmp::Reverse(self.items[*item].level));
+        let n_items = items.len();
+        self.order = FetchOrder { items, phase_ends: vec![n_items] };
+        self
     }
 
     /// The bytes of all items that are not fetched yet.

@@ -1,6 +1,8 @@
 //! The `brickfield` command: look at a volume file, render it, save it in another format, list the backends.
 
 mod convert;
+#[cfg(feature = "fetch")]
+mod fetched;
 mod info;
 #[cfg(feature = "formats")]
 mod pack;
@@ -148,6 +150,16 @@ struct RenderArgs {
     /// Bytes that the trimmed bricks' texture may take on the device, in MiB: what does not fit is drawn in batches, with the same picture
     #[arg(long, value_name = "MIB", requires = "trim", value_parser = values::positive, allow_hyphen_values = true)]
     cache_mib: Option<f64>,
+    /// Draw what so many KiB of a store give: the whole volume coarse, then what the view shows, where that gains most (of a store of
+    /// `brickfield pack`: a folder, or the URL under which it is served; flat blocks of 32 voxels)
+    #[cfg(feature = "fetch")]
+    #[arg(long, value_name = "KIB", conflicts_with_all = ["show_bricks", "trim", "budget_mib", "ratio", "block_level"],
+          value_parser = values::positive, allow_hyphen_values = true)]
+    fetch_kib: Option<f64>,
+    /// A part of the volume that is fetched before the others, as a box of --clip
+    #[cfg(feature = "fetch")]
+    #[arg(long, value_name = "BOX", requires = "fetch_kib", value_parser = values::clip, allow_hyphen_values = true)]
+    region: Option<Aabb>,
     #[arg(long, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "drawn",
           conflicts_with = "blocks", value_parser = values::boxes, help = show_bricks_help())]
     show_bricks: Option<Boxes>,

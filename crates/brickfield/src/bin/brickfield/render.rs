@@ -31,6 +31,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     args.light.check()?;
     check_together(args)?;
     let mut backend = open(args)?;
+    #[cfg(feature = "fetch")]
+    if let Some(kib) = args.fetch_kib {
+        return crate::fetched::render(args, kib, backend.as_mut());
+    }
     if let Some(side) = args.flat.blocks {
         return render_blocks(args, side, backend.as_mut());
     }
@@ -85,9 +89,8 @@ fn check_together(args: &RenderArgs) -> Result<(), OptionError> {
 
 /// A store has values alone: options that ask for more are refused before anything is read of it.
 #[cfg(feature = "formats")]
-fn check_of_store(args: &RenderArgs, blocks: &Blocks) -> Result<(), OptionError> {
+pub(crate) fn check_of_store(args: &RenderArgs) -> Result<(), OptionError> {
     let option = match (args.flat.classify, args.light.normals) {
-        _ if blocks.volume().is_some() => return Ok(()),
         (Classification::Prefiltered, _) => "--classify prefiltered",
         (_, Normals::Stored) => "--normals stored",
         (_, Normals::Surface) => "--normals surface",
@@ -101,7 +104,9 @@ fn check_of_store(args: &RenderArgs, blocks: &Blocks) -> Result<(), OptionError>
 fn render_blocks(args: &RenderArgs, side: BlockSide, backend: &mut dyn Backend) -> Result<(), Failure> {
     let subject = args.flat.open(&args.file, &args.input, side, &args.view)?;
     #[cfg(feature = "formats")]
-    check_of_store(args, &subject.blocks)?;
+    if matches!(subject.blocks, Blocks::Store(_)) {
+        check_of_store(args)?;
+    }
     let source = subject.blocks.source();
     let scene = args.view.scene_of(source.grid(), subject.frame, &subject.transfer)?;
     let scene = args.sampling.of(scene, subject.blocks.finest_voxels(), args.flat.classify)?;
@@ -170,7 +175,7 @@ fn render_in_batches(
 }
 
 /// Writes the picture, and prints what it was made by.
-fn finish(
+pub(crate) fn finish(
     args: &RenderArgs,
     backend: &dyn Backend,
     scene: &Scene,
@@ -254,7 +259,7 @@ fn note_if_nothing_shows(plan: &FramePlan) {
     }
 }
 
-fn check_validation(messages: &[String]) -> Result<(), Failure> {
+pub(crate) fn check_validation(messages: &[String]) -> Result<(), Failure> {
     messages.iter().for_each(|m| eprintln!("validation: {m}"));
     if messages.is_empty() { Ok(()) } else { Err(Failure::Validation { n_messages: messages.len() }) }
 }
