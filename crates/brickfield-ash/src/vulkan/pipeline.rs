@@ -134,7 +134,7 @@ impl Pipeline {
     fn lay_out(&mut self) -> Result<(), RenderError> {
         let stages = match self.entry {
             Entry::Proxy(_) => vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
-            Entry::March | Entry::Evaluate(_) | Entry::Probe(_) => vk::ShaderStageFlags::COMPUTE,
+            Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => vk::ShaderStageFlags::COMPUTE,
         };
         let binding = |b: &Binding| {
             vk::DescriptorSetLayoutBinding::default()
@@ -178,7 +178,7 @@ impl Pipeline {
         let module = module.of("vkCreateShaderModule")?;
         let made = match self.entry {
             Entry::Proxy(_) => self.compile_polygons(module, target),
-            Entry::March | Entry::Evaluate(_) | Entry::Probe(_) => self.compile_compute(module),
+            Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => self.compile_compute(module),
         };
         // SAFETY: a pipeline does not need its module any more.
         unsafe { device.raw().destroy_shader_module(module, None) };
