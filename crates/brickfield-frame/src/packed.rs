@@ -195,3 +195,54 @@ fn pack<T: Sample>(extent: UVec3, samples: &[T], max_error: u16) -> Option<(Pack
     let restored = if header.max_error() == 0 { None } else { Some(decode(&brick).ok()?.samples) };
     Some((packed, restored))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use brickfield_core::BrickSide;
+
+    use super::*;
+    use crate::{Chunk, Decode, Places, Slots, SlotsError};
+
+    const LOSSLESS: Upload = Upload::Packed { max_error: 0 };
+
+    fn chunk(extent: UVec3, format: SampleFormat, upload: Upload, sample: impl Fn(u32) -> u8) -> Chunk {
+        let n = extent.element_product() * format.n_bytes() as u32;
+        Chunk::of_samples(extent, format, (0..n).map(sample).collect(), upload)
+    }
+
+    #[test]
+    fn samples_are_packed_where_that_is_fewer_bytes() {
+        let (side, noise) = (UVec3::splat(16), |i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8);
+        let unorm8 = |sample: fn(u32) -> u8| chunk(side, SampleFormat::Unorm8, LOSSLESS, sample);
+        let ramp = unorm8(|i| (i % 16 + i / 256) as u8);
+        let packed = ramp.packed().unwrap();
+        assert!(packed.n_bytes() < 4096 / 2 && packed.n_levels() == 2 && packed.extent() == side);
+        assert_eq!(unorm8(|_| 7).packed().unwrap().n_bytes(), 48);
+        assert!(chunk(side, SampleFormat::Unorm8, LOSSLESS, noise).packed().is_none());
+        assert!(chunk(side, SampleFormat::Float32, LOSSLESS, |_| 0).packed().is_none());
+        assert!(chunk(side, SampleFormat::Unorm8, Upload::Plain, |_| 7).packed().is_none());
+        let renewed = ramp.renewed();
+        assert!(renewed.id() != ramp.id() && renewed.packed() == ramp.packed() && renewed == ramp);
+    }
+
+    #[test]
+    fn lossy_samples_are_those_that_come_back() {
+        let noise = |i: u32| 100 + (i.wrapping_mul(2_654_435_761) >> 27) as u8;
+        let [own, lossy] = [Upload::Plain, Upload::Packed { max_error: 3 }]
+            .map(|u| chunk(UVec3::new(9, 8, 7), SampleFormat::Unorm8, u, noise));
+        let worst = own.bytes().iter().zip(lossy.bytes()).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(worst == Some(3) && lossy.packed().is_some(), "{worst:?}");
+    }
+
+    #[test]
+    fn packed_samples_of_another_extent_are_refused() {
+        let extent = UVec3::new(32, 16, 8);
+        let chunk = Arc::new(chunk(extent, SampleFormat::Unorm8, LOSSLESS, |_| 7));
+        let decode = Decode { scale: 1.0, offset: 0.0 };
+        let slots = Slots::new(SampleFormat::Unorm8, decode, Places::Even(BrickSide::S16), vec![None, Some(chunk)]);
+        let expected = SlotsError::Packed { slot: 1, packed: extent, extent: UVec3::splat(16) };
+        assert_eq!(slots.map(|slots| slots.n_slots()), Err(expected));
+    }
+}

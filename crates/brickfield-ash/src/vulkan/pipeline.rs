@@ -72,11 +72,6 @@ impl Pipeline {
         self.bindings.iter().any(|b| b.resource == resource)
     }
 
-    /// Whether the shader has a binding of a kind.
-    pub(crate) fn has(&self, kind: BindingKind) -> bool {
-        self.bindings.iter().any(|b| b.kind == kind)
-    }
-
     /// Invocations along x, y, z of a workgroup.
     pub(crate) fn workgroup_size(&self) -> [u32; 3] {
         self.workgroup_size
