@@ -4,6 +4,7 @@
 //! every backend to the f64 answer, and its own cases to mutants; `orders` prints observed orders of accuracy; `speed` times; `gpu`
 //! measures a graphics card, alone. Whatever is timed is timed by [`turns`].
 
+pub mod codecs;
 pub mod compare;
 pub mod conformance;
 pub mod gpu;

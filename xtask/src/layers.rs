@@ -23,7 +23,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("brickfield-haar", &["core"]),
     ("brickfield-haar-zarrs", &["core", "haar"]),
     ("brickfield-curvilinear", &["core"]),
-    ("brickfield-frame", &["core", "optics"]),
+    ("brickfield-frame", &["core", "optics", "haar"]),
     ("brickfield-shaders", &["core", "optics", "frame"]),
     ("brickfield-cpu", &["core", "optics", "interp", "frame"]),
     ("brickfield-wgpu", &["core", "frame", "shaders"]),

@@ -83,11 +83,12 @@ impl AshBackend {
         self
     }
 
-    /// Replaces the shader sources.
+    /// Replaces the shader sources; the samples that they have unpacked are dropped.
     pub fn set_library(&mut self, library: ShaderLibrary) {
         let choice = self.pipelines.choice();
         self.pipelines = pipelines(&self.device, library);
         self.pipelines.set_choice(choice);
+        self.resources.forget_textures();
     }
 
     /// The messages of the validation layer, as a log that outlives the backend: messages about its end are in it, too.
@@ -114,8 +115,9 @@ impl AshBackend {
         is_first: bool,
         (chosen, started): (Chosen, Instant),
     ) -> Result<(Timing, u64), RenderError> {
-        let pipeline = self.pipelines.of(chosen.key)?;
+        let pipeline = (&mut self.pipelines, chosen.key);
         let Brought { uniforms, n_bytes } = self.resources.bring(&mut self.queue, &mut self.staging, plan, pipeline)?;
+        let pipeline = self.pipelines.of(chosen.key)?;
         let picture = reserve_picture(&mut self.picture, &self.device, plan.size())?;
         let group_height = pipeline.workgroup_size()[1];
         if pipeline.uses(Resource::SeenBefore) {
@@ -142,11 +144,11 @@ impl AshBackend {
         (chosen, started): (Chosen, Instant),
     ) -> Result<(Timing, u64), RenderError> {
         let canvas = reserve_canvas(&mut self.canvas, &self.device, proxy.target(), plan.size())?;
-        let pipeline = self.pipelines.of(chosen.key)?;
+        let pipeline = (&mut self.pipelines, chosen.key);
         let brought = self.resources.bring(&mut self.queue, &mut self.staging, plan, pipeline)?;
         let of_polygons = self.polygons.bring(&self.device, &mut self.queue, &mut self.staging, proxy)?;
         let resources = &self.resources;
-        let bound = pipeline.bind(|binding| resources.bindable(binding))?;
+        let bound = self.pipelines.of(chosen.key)?.bind(|binding| resources.bindable(binding))?;
         let upload_ms = milliseconds_since(started);
         let time = self.polygons.draw(&mut self.queue, &bound, canvas, proxy, is_first)?;
         Ok((timing(upload_ms, &time), brought.n_bytes + of_polygons))

@@ -18,7 +18,7 @@ impl AshBackend {
         inputs: &[[f32; 4]],
     ) -> Result<Vec<[f32; 4]>, RenderError> {
         let variant = Variant::of(plan, Entry::Evaluate(function));
-        let pipeline = self.pipelines.of(PipelineKey::computing(variant))?;
+        let pipeline = (&mut self.pipelines, PipelineKey::computing(variant));
         self.resources.bring(&mut self.queue, &mut self.staging, plan, pipeline)?;
         let mut outputs = Vec::with_capacity(inputs.len());
         for chunk in shader_inputs(plan, function, inputs).chunks(INPUTS_PER_DISPATCH) {

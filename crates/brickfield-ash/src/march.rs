@@ -76,7 +76,7 @@ pub(crate) fn read_back(
         let host = &*staging.read_back(n_bytes)?;
         queue.run("reading the picture back", |recorder| {
             recorder.image_barrier(picture, before, Use::CopySource);
-            let part = ImageBox { buffer_offset: 0, origin, extent };
+            let part = ImageBox { buffer_offset: 0, row_bytes: None, origin, extent };
             recorder.read_back(picture, host, target.pixel_bytes() as u64, part);
             recorder.barrier(Use::CopyTarget, Use::HostRead);
         })?;

@@ -68,8 +68,8 @@ impl AshBackend {
             let bytes = work.layers(z, n);
             let buffer = self.staging.upload(bytes.len())?;
             buffer.write(0, &bytes);
-            let (buffer, origin, extent) = (&*buffer, UVec3::new(0, 0, z), UVec3::new(x, y, n));
-            let part = ImageBox { buffer_offset: 0, origin, extent };
+            let (buffer, origin, extent) = (buffer.buffer(), UVec3::new(0, 0, z), UVec3::new(x, y, n));
+            let part = ImageBox { buffer_offset: 0, row_bytes: None, origin, extent };
             self.queue.run("uploading a texture", |recorder| {
                 recorder.fill(buffer, &image, work.format.n_bytes() as u64, &[part]);
             })?;

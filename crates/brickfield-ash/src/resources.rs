@@ -6,8 +6,10 @@ use std::sync::Arc;
 
 use ash::vk;
 use brickfield_core::BrickSide;
-use brickfield_frame::{AtlasShape, Chunked, Content, FramePlan, FrameUniforms, HeldChunks, RenderError, Resource};
-use brickfield_shaders::{Binding, BindingKind};
+use brickfield_frame::{
+    AtlasShape, Chunked, Content, FramePlan, FrameUniforms, HeldChunks, RenderError, Resource, Slots,
+};
+use brickfield_shaders::{Binding, BindingKind, PipelineKey, Pipelines, decodings};
 
 use crate::error::FailedCall;
 use crate::march::PIXEL_BYTES;
@@ -68,38 +70,42 @@ impl Resources {
 
     fn entry(&mut self, resource: Resource) -> &mut Reused {
         let usage = match resource {
-            Resource::Frame => vk::BufferUsageFlags::UNIFORM_BUFFER,
+            Resource::Frame | Resource::Decoding => vk::BufferUsageFlags::UNIFORM_BUFFER,
             _ => vk::BufferUsageFlags::STORAGE_BUFFER,
         };
         self.buffers.entry(resource).or_insert_with(|| Reused::new(resource.name(), usage))
     }
 
-    /// Brings to the device the contents of `plan` that `pipeline` reads and the device lacks: numbers and lists in one submit.
+    /// Brings to the device the contents of `plan` that the pipeline of `key` reads and the device lacks: numbers and lists in one submit.
     pub(crate) fn bring(
         &mut self,
         queue: &mut Queue,
         staging: &mut Staging,
         plan: &FramePlan,
-        pipeline: &Pipeline,
+        (pipelines, key): (&mut Pipelines<Pipeline>, PipelineKey),
     ) -> Result<Brought, RenderError> {
         let device = self.device.clone();
+        let decoder = PipelineKey::decoding(plan).map(|key| pipelines.of(key).map(|_| key)).transpose()?;
+        let bindings = pipelines.of(key)?.bindings().to_vec();
         let (mut n_bytes, mut numbers, mut lists) = (0, Vec::new(), Vec::new());
-        for Binding { resource, .. } in pipeline.bindings() {
+        for Binding { resource, .. } in &bindings {
             match plan.content(*resource) {
                 Some(Content::Bytes(bytes)) => numbers.push((*resource, bytes)),
                 Some(Content::Chunks(chunks)) => lists.push((*resource, chunks)),
                 Some(Content::Texture(slots)) => {
-                    let filtered = pipeline.has(BindingKind::Sampler);
+                    let filtered = bindings.iter().any(|b| b.kind == BindingKind::Sampler);
                     let texture = self.textures.remove(resource);
                     let mut texture = Texture::with_room(&device, queue, slots, filtered, texture)?;
-                    n_bytes += texture.upload(queue, staging, slots)?;
+                    let decoder = decoder.map(|key| pipelines.of(key)).transpose()?;
+                    n_bytes += self.fill_texture(queue, staging, slots, decoder, &texture)?;
+                    texture.hold(slots);
                     self.textures.insert(*resource, texture);
                 }
                 None => {}
             }
         }
         let uniforms = FrameUniforms::of(plan, self.atlas_shape(plan));
-        if pipeline.uses(Resource::Frame) {
+        if bindings.iter().any(|b| b.resource == Resource::Frame) {
             numbers.push((Resource::Frame, Cow::Borrowed(bytemuck::bytes_of(&uniforms))));
         }
         for (resource, bytes) in &numbers {
@@ -113,6 +119,46 @@ impl Resources {
             self.entry(resource).held.hold(chunks);
         }
         Ok(Brought { uniforms, n_bytes })
+    }
+
+    /// Brings the slots that a texture lacks; the bytes that were brought.
+    fn fill_texture(
+        &mut self,
+        queue: &mut Queue,
+        staging: &mut Staging,
+        slots: &Slots,
+        decoder: Option<&mut Pipeline>,
+        texture: &Texture,
+    ) -> Result<u64, RenderError> {
+        let missing = texture.missing(slots);
+        if missing.is_empty() {
+            return Ok(0);
+        }
+        texture.open(queue)?;
+        let mut n_bytes = texture.upload(queue, staging, slots, &missing)?;
+        if let Some(decoder) = decoder {
+            for decoding in decodings(texture.shape(), slots, &missing) {
+                self.unpack(queue, staging, decoder, &decoding, texture)?;
+                n_bytes += decoding.n_bytes();
+            }
+            staging.shrink();
+            self.shrink();
+        }
+        texture.close(queue)?;
+        Ok(n_bytes)
+    }
+
+    /// All slots are brought again for the next plan.
+    pub(crate) fn forget_textures(&mut self) {
+        self.textures.clear();
+    }
+
+    /// Frees a buffer of more bytes than these.
+    pub(crate) fn free_if_larger(&mut self, resource: Resource, n_bytes: u64) {
+        let is_larger = |reused: &Reused| reused.buffer.as_ref().is_some_and(|buffer| buffer.n_bytes() > n_bytes);
+        if self.buffers.get(&resource).is_some_and(is_larger) {
+            self.buffers.remove(&resource);
+        }
     }
 
     /// Fills buffers that have room.

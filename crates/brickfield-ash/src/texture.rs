@@ -92,30 +92,56 @@ impl Texture {
         Ok(Texture { held: self.held, ..larger })
     }
 
-    /// Writes the slots that are not there; their bytes.
+    /// Bytes of a texel.
+    pub(crate) fn texel_bytes(&self) -> u64 {
+        self.format.n_bytes() as u64
+    }
+
+    /// How slots lie in it.
+    pub(crate) fn shape(&self) -> TextureShape {
+        self.shape
+    }
+
+    /// The slots that are not there.
+    pub(crate) fn missing(&self, slots: &Slots) -> Vec<u32> {
+        self.held.missing(slots).into_iter().flatten().map(|slot| slot as u32).collect()
+    }
+
+    /// All slots are there now.
+    pub(crate) fn hold(&mut self, slots: &Slots) {
+        self.held.hold(slots);
+    }
+
+    /// Lets copies write it, until it is [`close`](Self::close)d.
+    pub(crate) fn open(&self, queue: &mut Queue) -> Result<(), RenderError> {
+        queue.run("opening the atlas", |recorder| {
+            recorder.image_barrier(&self.image, Use::ShaderRead, Use::CopyTarget);
+        })
+    }
+
+    /// Lets shaders read it again.
+    pub(crate) fn close(&self, queue: &mut Queue) -> Result<(), RenderError> {
+        queue.run("finishing the atlas", |recorder| {
+            recorder.image_barrier(&self.image, Use::CopyTarget, Use::ShaderRead);
+        })
+    }
+
+    /// Writes those of some slots that are not packed, while it is open; their bytes.
     pub(crate) fn upload(
-        &mut self,
+        &self,
         queue: &mut Queue,
         staging: &mut Staging,
         slots: &Slots,
+        some: &[u32],
     ) -> Result<u64, RenderError> {
-        let missing: Vec<u32> = self.held.missing(slots).into_iter().flatten().map(|slot| slot as u32).collect();
+        let is_plain = |slot: &u32| slots.samples(*slot).is_some_and(|chunk| chunk.packed().is_none());
+        let plain: Vec<u32> = some.iter().copied().filter(is_plain).collect();
+        let slot_bytes = slots.chunk_bytes().next_multiple_of(ALIGNMENT);
         let mut n_bytes = 0;
-        if !missing.is_empty() {
-            let image = &self.image;
-            queue.run("opening the atlas", |recorder| {
-                recorder.image_barrier(image, Use::ShaderRead, Use::CopyTarget);
-            })?;
-            let slot_bytes = slots.chunk_bytes().next_multiple_of(ALIGNMENT);
-            for some in missing.chunks(staging.pieces_at_once(slot_bytes)) {
-                n_bytes += self.copy(queue, staging, slots, some)?;
-            }
-            staging.shrink();
-            queue.run("finishing the atlas", |recorder| {
-                recorder.image_barrier(image, Use::CopyTarget, Use::ShaderRead);
-            })?;
+        for some in plain.chunks(staging.pieces_at_once(slot_bytes)) {
+            n_bytes += self.copy(queue, staging, slots, some)?;
         }
-        self.held.hold(slots);
+        staging.shrink();
         Ok(n_bytes)
     }
 
@@ -129,16 +155,15 @@ impl Texture {
             n_bytes += samples.bytes().len() as u64;
             boxes.push(self.place(slots, *slot, (i * slot_bytes) as u64));
         }
-        let buffer = &*buffer;
-        let texel_bytes = self.format.n_bytes() as u64;
-        queue.run("uploading samples", |recorder| recorder.fill(buffer, &self.image, texel_bytes, &boxes))?;
+        let buffer = buffer.buffer();
+        queue.run("uploading samples", |recorder| recorder.fill(buffer, &self.image, self.texel_bytes(), &boxes))?;
         Ok(n_bytes)
     }
 
     /// From a slot's place in staging memory to its place in the texture.
     fn place(&self, slots: &Slots, slot: u32, buffer_offset: u64) -> ImageBox {
         let (origin, extent) = self.shape.texels_of(slots, slot);
-        ImageBox { buffer_offset, origin, extent }
+        ImageBox { buffer_offset, row_bytes: None, origin, extent }
     }
 }
 

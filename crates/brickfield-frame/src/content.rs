@@ -3,6 +3,10 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use brickfield_core::glam::UVec3;
+
+use crate::{PackedSamples, SampleFormat, Upload};
+
 /// The identity of a content that does not change: equal bytes elsewhere are another content.
 ///
 /// Contents are compared by identity, so that nothing of a frame is compared byte by byte, and nothing that a device holds is
@@ -19,17 +23,42 @@ impl ContentId {
     }
 }
 
-/// Bytes that do not change, with their identity.
+/// Bytes that do not change, with their identity; the samples of a slot may also be packed for devices.
 #[derive(Debug)]
 pub struct Chunk {
     id: ContentId,
     bytes: Box<[u8]>,
+    packed: Option<PackedSamples>,
 }
 
 impl Chunk {
     /// A new content.
     pub fn new(bytes: impl Into<Box<[u8]>>) -> Chunk {
-        Chunk { id: ContentId::new(), bytes: bytes.into() }
+        Chunk { id: ContentId::new(), bytes: bytes.into(), packed: None }
+    }
+
+    /// The samples of a slot, x of the texture fastest, as a device is to be brought them. With losses, they are the samples that come
+    /// back.
+    pub fn of_samples(extent: UVec3, format: SampleFormat, samples: Vec<u8>, upload: Upload) -> Chunk {
+        let packed = match upload {
+            Upload::Plain => None,
+            Upload::Packed { max_error } => PackedSamples::of(extent, format, &samples, max_error),
+        };
+        match packed {
+            None => Chunk::new(samples),
+            Some((packed, restored)) => Chunk { packed: Some(packed), ..Chunk::new(restored.unwrap_or(samples)) },
+        }
+    }
+
+    /// The same content under another identity.
+    #[must_use]
+    pub fn renewed(&self) -> Chunk {
+        Chunk { id: ContentId::new(), bytes: self.bytes.clone(), packed: self.packed.clone() }
+    }
+
+    /// The packed samples, which are what a device is brought if there are any.
+    pub fn packed(&self) -> Option<&PackedSamples> {
+        self.packed.as_ref()
     }
 
     /// Its identity.

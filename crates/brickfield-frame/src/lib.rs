@@ -7,6 +7,7 @@ mod facets;
 mod feature;
 mod field;
 mod lighting;
+mod packed;
 mod pass;
 mod plan;
 mod probe;
@@ -33,6 +34,7 @@ pub use field::{
     IndexLattice, Join, Packing, Places, Reach, Room, RoomChange, SampleFormat, Slots, SlotsError, TextureShape,
 };
 pub use lighting::{LightUniform, Lighting};
+pub use packed::{DecodingUniforms, PackedSamples, PackedUniform, Upload};
 pub use pass::Pass;
 pub use plan::{Drawing, FramePlan, PlanError, PlanParts, Sequence};
 pub use probe::{Fetch, Probe, ProbeUniforms, TextureReads, TextureWork};

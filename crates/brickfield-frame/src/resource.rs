@@ -59,6 +59,16 @@ pub enum Resource {
     Probe,
     /// The means of a probe's rays.
     Means,
+    /// The task of a device that unpacks samples ([`DecodingUniforms`](crate::DecodingUniforms)).
+    Decoding,
+    /// The packed slots ([`PackedUniform`](crate::PackedUniform)).
+    PackedBricks,
+    /// The words of packed slots ([`PackedSamples::words`](crate::PackedSamples::words)).
+    PackedWords,
+    /// The coefficients of packed slots, and then their values.
+    Coefficients,
+    /// The texels of packed slots, on their way to the atlas.
+    Texels,
 }
 
 /// The data that a plan brings for a resource.
@@ -73,7 +83,7 @@ pub enum Content<'a> {
 
 impl Resource {
     /// All resources.
-    pub const ALL: [Resource; 24] = [
+    pub const ALL: [Resource; 29] = [
         Resource::Frame,
         Resource::Atlas,
         Resource::AtlasSampler,
@@ -98,6 +108,11 @@ impl Resource {
         Resource::Facets,
         Resource::Probe,
         Resource::Means,
+        Resource::Decoding,
+        Resource::PackedBricks,
+        Resource::PackedWords,
+        Resource::Coefficients,
+        Resource::Texels,
     ];
 
     /// The name in shaders and messages.
@@ -127,6 +142,11 @@ impl Resource {
             Resource::Facets => "facets",
             Resource::Probe => "probe",
             Resource::Means => "means",
+            Resource::Decoding => "decoding",
+            Resource::PackedBricks => "packed_bricks",
+            Resource::PackedWords => "packed_words",
+            Resource::Coefficients => "coefficients",
+            Resource::Texels => "texels",
         }
     }
 
@@ -168,7 +188,12 @@ impl FramePlan {
             | Resource::Outputs
             | Resource::SeenBefore
             | Resource::Probe
-            | Resource::Means => None,
+            | Resource::Means
+            | Resource::Decoding
+            | Resource::PackedBricks
+            | Resource::PackedWords
+            | Resource::Coefficients
+            | Resource::Texels => None,
         }
     }
 }

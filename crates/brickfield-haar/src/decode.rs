@@ -6,7 +6,7 @@ use brickfield_core::{Level, ScalarType};
 use crate::coded::{self, BrokenSection};
 use crate::encode::LowBand;
 use crate::extent::{ExtentError, n_samples};
-use crate::header::{Body, BrickHeader, FORMAT_VERSION, N_CHECKSUM_BYTES, matches_checksum};
+use crate::header::{Body, BrickHeader, FORMAT_VERSION, N_CHECKSUM_BYTES, Storage, matches_checksum};
 use crate::kernel::Kernel;
 use crate::packed;
 use crate::quantise::Quantiser;
@@ -42,6 +42,8 @@ pub enum DecodeError {
     Extent(#[from] ExtentError),
     #[error("the brick's samples are {found}, not {wanted}")]
     Type { found: ScalarType, wanted: ScalarType },
+    #[error("the brick's storage is {found:?}; only one of {wanted:?} has groups")]
+    Storage { found: Storage, wanted: Storage },
     #[error("section {section} makes no coefficients: the brick is damaged")]
     Section { section: usize },
     #[error("level {level} of a brick; it has levels 0 to {coarsest}")]
@@ -74,10 +76,12 @@ pub fn decode_with_low<T: Sample>(brick: &[u8], low: &[T]) -> Result<Decoded<T>,
     level_of(&whole_brick(brick)?, brick, Level(0), Some(low))
 }
 
-/// The header of a brick that ends with its last section.
-fn whole_brick(brick: &[u8]) -> Result<BrickHeader, DecodeError> {
+/// The header of a brick that ends with its last section, of which no byte may be missing.
+pub(crate) fn whole_brick(brick: &[u8]) -> Result<BrickHeader, DecodeError> {
     let header = BrickHeader::read(brick)?;
-    match brick.len().checked_sub(header.n_bytes_of_level(Level(0))) {
+    let needed = header.n_bytes_of_level(Level(0));
+    match brick.len().checked_sub(needed) {
+        None => Err(DecodeError::Truncated { needed, given: brick.len() }),
         Some(extra) if extra > 0 => Err(DecodeError::TooLong { extra }),
         _ => Ok(header),
     }
@@ -126,7 +130,7 @@ fn in_range<T: Sample>(value: i64) -> Result<T, DecodeError> {
 }
 
 /// The sections that a level needs, without their checksums, which match.
-fn sections<'a>(header: &BrickHeader, brick: &'a [u8], level: Level) -> Result<Vec<&'a [u8]>, DecodeError> {
+pub(crate) fn sections<'a>(header: &BrickHeader, brick: &'a [u8], level: Level) -> Result<Vec<&'a [u8]>, DecodeError> {
     let mut rest = &brick[header.n_bytes..header.n_bytes_of_level(level)];
     let mut sections = Vec::new();
     for &n in &header.n_section_bytes[..header.n_sections_of_level(level)] {

@@ -169,6 +169,19 @@ impl BrickHeader {
         self.max_error
     }
 
+    /// The odd number by which decoded values are multiplied; 1 if samples were not rounded to multiples of it.
+    pub fn step(&self) -> u32 {
+        self.step
+    }
+
+    /// The value of all samples of a brick of [`Storage::OneValue`].
+    pub fn one_value(&self) -> Option<i64> {
+        match self.body {
+            Body::Value(value) => Some(value),
+            Body::Raw | Body::Packed | Body::Coded(_) => None,
+        }
+    }
+
     /// The bytes of the header.
     pub fn n_header_bytes(&self) -> usize {
         self.n_bytes

@@ -14,7 +14,8 @@ use crate::extent::BandBox;
 use crate::sample::Coefficient;
 use crate::transform::Bands;
 
-const N_IN_GROUP: usize = 64;
+/// Numbers of a group, but for the last one.
+pub(crate) const N_IN_GROUP: usize = 64;
 /// The widest number. Coefficients of u32 have at most 40 bits.
 const GREATEST_WIDTH: u8 = 56;
 
@@ -39,19 +40,24 @@ fn n_section_bytes<C: Coefficient>(array: &[C], all: UVec3, boxes: &[BandBox]) -
                 union = own.iter().fold(union, |union, c| union | zigzag(c.to_i64()));
                 n_in_group += own.len();
                 if n_in_group == N_IN_GROUP {
-                    n_bytes += n_group_bytes(union, n_in_group);
+                    n_bytes += 1 + n_group_bytes(n_bits(union), n_in_group);
                     (union, n_in_group) = (0, 0);
                 }
                 row = rest;
             }
         }
     }
-    if n_in_group == 0 { n_bytes } else { n_bytes + n_group_bytes(union, n_in_group) }
+    if n_in_group == 0 { n_bytes } else { n_bytes + 1 + n_group_bytes(n_bits(union), n_in_group) }
 }
 
-/// The bytes of a group, its width among them.
-fn n_group_bytes(union: u64, n: usize) -> usize {
-    1 + ((u64::BITS - union.leading_zeros()) as usize * n).div_ceil(8)
+/// The bytes of a group of `n` numbers of a width, without the byte of its width.
+pub(crate) fn n_group_bytes(width: u32, n: usize) -> usize {
+    (width as usize * n).div_ceil(8)
+}
+
+/// The bits of a number, from its highest one on.
+fn n_bits(number: u64) -> u32 {
+    u64::BITS - number.leading_zeros()
 }
 
 /// For each section its array, the array's extent and the boxes in it; no box for a low band elsewhere.
@@ -84,7 +90,7 @@ fn rows(band: &BandBox) -> impl Iterator<Item = (usize, usize)> + use<> {
 }
 
 fn width(group: &[u64]) -> u8 {
-    (u64::BITS - group.iter().fold(0, |all, n| all | n).leading_zeros()) as u8
+    n_bits(group.iter().fold(0, |all, n| all | n)) as u8
 }
 
 fn encode_section(numbers: &[u64]) -> Vec<u8> {
@@ -144,8 +150,8 @@ fn decode_numbers<C: Coefficient>(bytes: &[u8], n: usize) -> Result<Vec<C>, Brok
         if width > GREATEST_WIDTH {
             return Err(BrokenSection);
         }
-        let (own, behind) =
-            groups.split_at_checked((group.len() * usize::from(width)).div_ceil(8)).ok_or(BrokenSection)?;
+        let n_bytes = n_group_bytes(u32::from(width), group.len());
+        let (own, behind) = groups.split_at_checked(n_bytes).ok_or(BrokenSection)?;
         decode_group(own, u32::from(width), group);
         groups = behind;
     }

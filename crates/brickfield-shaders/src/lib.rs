@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod decoding;
 mod evaluate;
 mod library;
 mod passes;
@@ -9,6 +10,7 @@ mod specialise;
 mod trial;
 mod variant;
 
+pub use decoding::{DecodedTexels, Decoding, DecodingTask, decodings};
 pub use evaluate::{shader_inputs, shader_outputs};
 pub use library::{PatchError, ShaderLibrary};
 pub use passes::{n_rays_that_go_on, passes};

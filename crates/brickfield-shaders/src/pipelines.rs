@@ -72,6 +72,13 @@ impl PipelineKey {
         PipelineKey { variant, target: Target::default() }
     }
 
+    /// The pipeline that unpacks the slots of a plan, if any are packed.
+    pub fn decoding(plan: &FramePlan) -> Option<PipelineKey> {
+        let of_values = Some(plan.field().slots());
+        let mut all = [of_values, plan.spreads(), plan.gradients()].into_iter().flatten();
+        all.any(|slots| slots.has_packed()).then(|| PipelineKey::computing(Variant::decode()))
+    }
+
     /// The pipeline of the general shader ([`Variant::general`]).
     #[must_use]
     pub fn general(self) -> PipelineKey {

@@ -209,16 +209,19 @@ pub enum Entry {
     Evaluate(ShaderFunction),
     /// Reads textures and does nothing else, to be timed ([`brickfield_frame::Probe`]).
     Probe(Fetch),
+    /// Unpacks the samples of slots ([`crate::Decoding`]).
+    Decode,
 }
 
 impl Entry {
-    /// All kinds of entries, the last two for each function and each fetch.
+    /// All kinds of entries, those of functions and fetches for each of them.
     pub fn all() -> impl Iterator<Item = Entry> {
         let functions = ShaderFunction::ALL.into_iter().map(Entry::Evaluate);
         [Entry::March, Entry::Proxy(Slices::Together), Entry::Proxy(Slices::InteriorsFirst)]
             .into_iter()
             .chain(functions)
             .chain(Fetch::ALL.map(Entry::Probe))
+            .chain([Entry::Decode])
     }
 
     /// The names of the entry points: one for compute, or one for vertices and one for fragments.
@@ -229,6 +232,7 @@ impl Entry {
             Entry::Evaluate(_) => &["evaluate"],
             Entry::Probe(Fetch::Filtered) => &["filtered"],
             Entry::Probe(Fetch::Loaded) => &["loaded"],
+            Entry::Decode => &["decode"],
         }
     }
 
@@ -239,6 +243,7 @@ impl Entry {
             Entry::Proxy(_) => "proxy",
             Entry::Evaluate(_) => "evaluate",
             Entry::Probe(_) => "probe",
+            Entry::Decode => "decode",
         }
     }
 }
@@ -294,7 +299,7 @@ impl Variant {
         };
         match self.entry {
             Entry::March | Entry::Proxy(_) => Variant { features, search, ..self },
-            Entry::Evaluate(_) | Entry::Probe(_) => self,
+            Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => self,
         }
     }
 
@@ -326,6 +331,11 @@ impl Variant {
     /// The shader that reads textures one way. It has nothing of a plan's.
     pub fn probe(fetch: Fetch) -> Variant {
         Variant::new(FeatureSet::default(), QuadratureRule::MidpointExponential, Entry::Probe(fetch))
+    }
+
+    /// The shader that unpacks samples. It has nothing of a plan's.
+    pub fn decode() -> Variant {
+        Variant::new(FeatureSet::default(), QuadratureRule::MidpointExponential, Entry::Decode)
     }
 
     /// The conditions (`@if(name)`) that hold.

@@ -3,7 +3,8 @@
 use std::mem::{offset_of, size_of};
 
 use brickfield_frame::{
-    Feature, FeatureSet, Fetch, FrameUniforms, KnotUniform, LightUniform, PlaceUniform, ProbeUniforms, QuadratureRule,
+    DecodingUniforms, Feature, FeatureSet, Fetch, FrameUniforms, KnotUniform, LightUniform, PackedUniform,
+    PlaceUniform, ProbeUniforms, QuadratureRule,
 };
 use brickfield_shaders::naga::{Module, TypeInner};
 use brickfield_shaders::{Entry, FieldKind, Variant, specialise};
@@ -45,6 +46,11 @@ fn host_and_shader_structs_have_the_same_layout() {
     assert_equal(&module, "Light", host!(LightUniform, steepness_x, steepness_y, steepness_z, world_x, world_y, world_z, source,
         ambient, diffuse, specular, shininess, greatest_slope, back));
     assert_equal(&module, "Place", host!(PlaceUniform, texel, level, first, padding, last, axes));
+    let decode = specialise(&Variant::decode()).unwrap().module;
+    assert_equal(&decode, "Decoding", host!(DecodingUniforms, task, level, axis, sample_bits));
+    #[rustfmt::skip]
+    assert_equal(&decode, "PackedBrick", host!(PackedUniform, extent, n_levels, first_coefficient, first_texel, row_words, step,
+        first_word, kernel, value, padding));
     for fetch in Fetch::ALL {
         assert_equal(&specialise(&Variant::probe(fetch)).unwrap().module, "Probe", host!(ProbeUniforms, work));
     }

@@ -137,6 +137,7 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
                 assert!(!uses(Resource::Index) || variant.features.contains(Feature::Light));
             }
             Entry::Probe(_) => assert!(uses(Resource::Means)),
+            Entry::Decode => assert!(uses(Resource::PackedWords) && shader.n_storage_buffers() == 4),
             Entry::Evaluate(_) => {
                 let outputs = |b: &&brickfield_shaders::Binding| b.resource == Resource::Outputs;
                 let outputs = shader.bindings.iter().find(outputs).unwrap();

@@ -65,13 +65,14 @@ impl WgpuBackend {
         })
     }
 
-    /// Takes another shader library; the pipelines built so far are dropped.
+    /// Takes another shader library; the pipelines built so far are dropped, and the samples that they have unpacked.
     ///
     /// For conformance runs, which must notice a library that is wrong in one place.
     pub fn set_library(&mut self, library: ShaderLibrary) {
         let choice = self.pipelines.choice();
         self.pipelines = pipelines(&self.device, library);
         self.pipelines.set_choice(choice);
+        self.resources.forget_textures();
     }
 
     fn check_size(&self, size: UVec2) -> Result<(), RenderError> {
@@ -172,6 +173,12 @@ impl Backend for WgpuBackend {
 }
 
 impl WgpuBackend {
+    /// The pipeline that unpacks a plan's slots, built; `None` if none is packed.
+    fn decoder(&mut self, plan: &FramePlan) -> Result<Option<PipelineKey>, RenderError> {
+        let key = PipelineKey::decoding(plan);
+        key.map(|key| self.pipelines.of(key).map(|_| key)).transpose()
+    }
+
     /// Draws a batch, over those before it.
     fn draw(&mut self, plan: &FramePlan, is_first: bool) -> Result<Cost, RenderError> {
         self.check_features(plan)?;
@@ -179,8 +186,10 @@ impl WgpuBackend {
         let started = Instant::now();
         let maker = plan.proxy().map_or(Maker::Rays, |proxy| Maker::Polygons(proxy.target()));
         let chosen = self.pipelines.choose(PipelineKey::of(plan))?;
+        let decoder = self.decoder(plan)?;
         let pipeline = &self.pipelines[chosen.key];
-        let Brought { uniforms, mut n_bytes } = self.resources.bring(&self.device, plan, pipeline)?;
+        let decoder = decoder.map(|key| &self.pipelines[key]);
+        let Brought { uniforms, mut n_bytes } = self.resources.bring(&self.device, plan, pipeline, decoder)?;
         self.resources.resize(&self.device, plan.size(), maker)?;
         if let Some(proxy) = plan.proxy() {
             n_bytes += self.polygons.bring(&self.device, proxy)?;
@@ -211,8 +220,10 @@ impl Evaluate for WgpuBackend {
     ) -> Result<Vec<[f32; 4]>, RenderError> {
         self.check_features(plan)?;
         let variant = Variant::of(plan, Entry::Evaluate(function));
-        let pipeline = self.pipelines.of(PipelineKey::computing(variant))?;
-        self.resources.bring(&self.device, plan, pipeline)?;
+        self.pipelines.of(PipelineKey::computing(variant))?;
+        let decoder = self.decoder(plan)?.map(|key| &self.pipelines[key]);
+        let pipeline = &self.pipelines[PipelineKey::computing(variant)];
+        self.resources.bring(&self.device, plan, pipeline, decoder)?;
         let mut results = Vec::with_capacity(inputs.len());
         for some in shader_inputs(plan, function, inputs).chunks(EVALUATED_AT_ONCE) {
             results.extend(self.evaluate_some(variant, some)?);
@@ -238,7 +249,8 @@ impl Outputs {
     }
 }
 
-fn dispatch(
+/// Runs a pipeline that computes, once.
+pub(crate) fn dispatch(
     device: &Device,
     pipeline: &Pipeline,
     resources: &Resources,

@@ -4,6 +4,7 @@ mod adapter;
 mod backend;
 mod buffer;
 mod clock;
+mod decode;
 mod device;
 mod picture;
 mod pipeline;

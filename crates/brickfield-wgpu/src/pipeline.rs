@@ -60,7 +60,7 @@ fn from_shader(device: &wgpu::Device, shader: Specialised, target: Target) -> Pi
     });
     let program = match entry {
         Entry::Proxy(_) => Program::Polygons(polygons(device, &pipeline_layout, &module, (entry, target))),
-        Entry::March | Entry::Evaluate(_) | Entry::Probe(_) => {
+        Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => {
             Program::Compute(compute(device, &pipeline_layout, &module, label))
         }
     };
@@ -143,7 +143,7 @@ fn layout_entry(binding: &Binding, entry: Entry, filtered: bool) -> wgpu::BindGr
     };
     let visibility = match entry {
         Entry::Proxy(_) => wgpu::ShaderStages::VERTEX_FRAGMENT,
-        Entry::March | Entry::Evaluate(_) | Entry::Probe(_) => wgpu::ShaderStages::COMPUTE,
+        Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => wgpu::ShaderStages::COMPUTE,
     };
     wgpu::BindGroupLayoutEntry { binding: binding.index, visibility, ty, count: None }
 }

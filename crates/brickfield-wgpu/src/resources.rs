@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use brickfield_core::BrickSide;
 use brickfield_core::glam::UVec2;
-use brickfield_frame::{AtlasShape, Content, FramePlan, FrameUniforms, RenderError, Resource};
-use brickfield_shaders::{Binding, BindingKind};
+use brickfield_frame::{AtlasShape, Content, FramePlan, FrameUniforms, RenderError, Resource, Slots};
+use brickfield_shaders::{Binding, BindingKind, decodings};
 use wgpu::BufferUsages;
 
 use crate::buffer::Reused;
@@ -49,26 +49,27 @@ impl Resources {
     /// The buffer of a resource.
     pub(crate) fn buffer(&mut self, resource: Resource) -> &mut Reused {
         let usage = match resource {
-            Resource::Frame => BufferUsages::UNIFORM,
+            Resource::Frame | Resource::Decoding => BufferUsages::UNIFORM,
             _ => BufferUsages::STORAGE,
         };
         let usage = usage | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         self.buffers.entry(resource).or_insert_with(|| Reused::new(resource.name(), usage))
     }
 
-    /// Brings to the device the contents of `plan` that `pipeline` reads and the device lacks.
+    /// Brings to the device the contents of `plan` that `pipeline` reads and the device lacks; `decoder` unpacks slots.
     pub(crate) fn bring(
         &mut self,
         device: &Device,
         plan: &FramePlan,
         pipeline: &Pipeline,
+        decoder: Option<&Pipeline>,
     ) -> Result<Brought, RenderError> {
         let mut n_bytes = 0;
         for Binding { resource, .. } in &pipeline.bindings {
             n_bytes += match plan.content(*resource) {
                 Some(Content::Bytes(bytes)) => self.buffer(*resource).write(device, &bytes)?,
                 Some(Content::Chunks(chunks)) => self.buffer(*resource).bring(device, chunks)?,
-                Some(Content::Texture(slots)) => Texture::bring(device, slots, &mut self.textures, *resource)?,
+                Some(Content::Texture(slots)) => self.bring_slots(device, *resource, slots, decoder)?,
                 None => 0,
             };
         }
@@ -77,6 +78,42 @@ impl Resources {
             n_bytes += self.buffer(Resource::Frame).write(device, bytemuck::bytes_of(&uniforms))?;
         }
         Ok(Brought { uniforms, n_bytes })
+    }
+
+    /// Brings the slots that the device lacks; the bytes that were brought.
+    fn bring_slots(
+        &mut self,
+        device: &Device,
+        resource: Resource,
+        slots: &Slots,
+        decoder: Option<&Pipeline>,
+    ) -> Result<u64, RenderError> {
+        let mut texture = Texture::with_room(device, slots, self.textures.remove(&resource))?;
+        let missing = texture.missing(slots);
+        let mut n_bytes = texture.upload(device, slots, &missing)?;
+        if let Some(decoder) = decoder {
+            for decoding in decodings(texture.shape(), slots, &missing) {
+                self.unpack(device, decoder, &decoding, &texture)?;
+                n_bytes += decoding.n_bytes();
+            }
+            self.shrink();
+        }
+        texture.hold(slots);
+        self.textures.insert(resource, texture);
+        Ok(n_bytes)
+    }
+
+    /// All slots are brought again for the next plan.
+    pub(crate) fn forget_textures(&mut self) {
+        self.textures.clear();
+    }
+
+    /// Frees a buffer of more bytes than these.
+    pub(crate) fn free_if_larger(&mut self, resource: Resource, n_bytes: u64) {
+        let is_larger = |reused: &Reused| reused.buffer().is_some_and(|buffer| buffer.size() > n_bytes);
+        if self.buffers.get(&resource).is_some_and(is_larger) {
+            self.buffers.remove(&resource);
+        }
     }
 
     /// How the slots of a plan lie in the atlas; that of one brick if no shader reads it.

@@ -1,11 +1,7 @@
 //! The samples of slots in a 3-D texture.
 
-use std::collections::BTreeMap;
-
 use brickfield_core::glam::UVec3;
-use brickfield_frame::{
-    AtlasShape, HeldChunks, RenderError, Resource, Room, RoomChange, SampleFormat, Slots, TextureShape,
-};
+use brickfield_frame::{AtlasShape, HeldChunks, RenderError, Room, RoomChange, SampleFormat, Slots, TextureShape};
 use wgpu::{Features, TextureFormat};
 
 use crate::device::Device;
@@ -23,32 +19,28 @@ pub(crate) struct Texture {
 const BYTES_AT_ONCE: usize = 64 << 20;
 
 impl Texture {
-    /// Brings the slots that the device lacks; returns the bytes that were brought.
-    pub(crate) fn bring(
-        device: &Device,
-        slots: &Slots,
-        textures: &mut BTreeMap<Resource, Texture>,
-        resource: Resource,
-    ) -> Result<u64, RenderError> {
-        let old = textures.remove(&resource);
-        let mut texture = match old {
-            Some(texture) if texture.held.has_all(slots) => texture,
-            old => Texture::with_room(device, slots, old)?,
-        };
-        let n_bytes = texture.upload(device, slots)?;
-        textures.insert(resource, texture);
-        Ok(n_bytes)
-    }
-
     /// How bricks lie in it.
     pub(crate) fn atlas_shape(&self) -> Option<AtlasShape> {
         self.shape.atlas()
     }
 
+    /// How slots lie in it.
+    pub(crate) fn shape(&self) -> TextureShape {
+        self.shape
+    }
+
+    /// Its texels from one on.
+    pub(crate) fn from(&self, UVec3 { x, y, z }: UVec3) -> wgpu::TexelCopyTextureInfo<'_> {
+        wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x, y, z }, ..self.texture.as_image_copy() }
+    }
+
     /// A texture with room for slots: the old texture, a larger texture with the old contents, or an empty texture.
-    fn with_room(device: &Device, slots: &Slots, old: Option<Texture>) -> Result<Texture, RenderError> {
+    pub(crate) fn with_room(device: &Device, slots: &Slots, old: Option<Texture>) -> Result<Texture, RenderError> {
+        let mut old = old.filter(|old| old.format == slots.format());
+        if let Some(old) = old.take_if(|old| old.held.has_all(slots)) {
+            return Ok(old);
+        }
         let limit = device.description.capabilities.max_texture_3d;
-        let old = old.filter(|old| old.format == slots.format());
         let room = slots.room(old.as_ref().map(|old| old.shape), limit)?;
         match (room, old) {
             (Room { change: RoomChange::Keep, .. }, Some(old)) => Ok(old),
@@ -101,10 +93,20 @@ impl Texture {
         Ok(Texture { held: self.held, ..larger })
     }
 
-    /// Writes the slots that are not there.
-    fn upload(&mut self, device: &Device, slots: &Slots) -> Result<u64, RenderError> {
-        let missing = self.held.missing(slots).into_iter().flatten().map(|slot| slot as u32);
-        let mut boxes: Vec<TexelBox> = missing.filter_map(|slot| TexelBox::of(self.shape, slots, slot)).collect();
+    /// The slots that are not there.
+    pub(crate) fn missing(&self, slots: &Slots) -> Vec<u32> {
+        self.held.missing(slots).into_iter().flatten().map(|slot| slot as u32).collect()
+    }
+
+    /// All slots are there now.
+    pub(crate) fn hold(&mut self, slots: &Slots) {
+        self.held.hold(slots);
+    }
+
+    /// Writes those of some slots that are not packed; their bytes.
+    pub(crate) fn upload(&self, device: &Device, slots: &Slots, some: &[u32]) -> Result<u64, RenderError> {
+        let boxes = some.iter().filter_map(|slot| TexelBox::of(self.shape, slots, *slot));
+        let mut boxes: Vec<TexelBox> = boxes.collect();
         boxes.sort_by_key(|b| (b.origin.z, b.origin.y, b.origin.x));
         let mut rows = boxes.chunk_by(TexelBox::goes_on_with).peekable();
         while rows.peek().is_some() {
@@ -120,7 +122,6 @@ impl Texture {
                 device.wait("uploading samples")?;
             }
         }
-        self.held.hold(slots);
         Ok(boxes.iter().map(|b| b.samples.len() as u64).sum())
     }
 
@@ -137,24 +138,21 @@ impl Texture {
     }
 
     fn write(&self, device: &Device, bytes: &[u8], origin: UVec3, size: UVec3) {
-        let to = wgpu::TexelCopyTextureInfo {
-            origin: wgpu::Origin3d { x: origin.x, y: origin.y, z: origin.z },
-            ..self.texture.as_image_copy()
-        };
         let layout = wgpu::TexelCopyBufferLayout {
             offset: 0,
             bytes_per_row: Some(size.x * self.format.n_bytes() as u32),
             rows_per_image: Some(size.y),
         };
-        device.queue.write_texture(to, bytes, layout, extent(size));
+        device.queue.write_texture(self.from(origin), bytes, layout, extent(size));
     }
 }
 
-fn extent(size: UVec3) -> wgpu::Extent3d {
+/// A size as wgpu takes it.
+pub(crate) fn extent(size: UVec3) -> wgpu::Extent3d {
     wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: size.z }
 }
 
-/// The samples of a slot, and the texels where they belong.
+/// The plain samples of a slot, and the texels where they belong.
 #[derive(Clone, Copy)]
 struct TexelBox<'a> {
     origin: UVec3,
@@ -165,7 +163,11 @@ struct TexelBox<'a> {
 impl<'a> TexelBox<'a> {
     fn of(shape: TextureShape, slots: &'a Slots, slot: u32) -> Option<TexelBox<'a>> {
         let (origin, size) = shape.texels_of(slots, slot);
-        slots.samples(slot).map(|chunk| TexelBox { origin, size, samples: chunk.bytes() })
+        slots.samples(slot).filter(|chunk| chunk.packed().is_none()).map(|chunk| TexelBox {
+            origin,
+            size,
+            samples: chunk.bytes(),
+        })
     }
 
     /// Whether both are one box, this one first along x.

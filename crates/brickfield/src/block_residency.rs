@@ -10,7 +10,7 @@ use brickfield_core::glam::UVec3;
 use brickfield_core::{BlockLayout, BlockSide, Companion, Level, TransferFunction, ValueRange};
 use brickfield_frame::{
     BlockPlaces, BlockRanges, BlockRow, BlockSamples, Chunk, Decode, Field, IndexEntry, IndexGrid, IndexLattice, Join,
-    Packing, Places, Reach, SampleFormat, Slots,
+    Packing, Places, Reach, SampleFormat, Slots, Upload,
 };
 use rayon::prelude::*;
 
@@ -27,6 +27,7 @@ pub struct BlockResidency {
     copied: Copied,
     /// The normals of surface voxels, while frames ask for them, and the work that the last frame made.
     surface: Option<(SurfaceNormals, SurfaceEdit)>,
+    upload: Upload,
 }
 
 /// The blocks of a source, at some levels.
@@ -93,6 +94,13 @@ impl BlockResidency {
         })
     }
 
+    /// Begins anew if samples are to be brought to a device another way.
+    pub(crate) fn serve(&mut self, upload: Upload) {
+        if self.upload != upload {
+            *self = BlockResidency { upload, ..BlockResidency::default() };
+        }
+    }
+
     /// Fetches the blocks that have another level than before, with the companions that are asked for; others are let go. The normals of
     /// surface voxels are those of the transfer function.
     pub(crate) fn hold(
@@ -109,8 +117,8 @@ impl BlockResidency {
         let is_new = |i: &usize| before.is_none_or(|held| held.rows[*i].level != levels[*i]);
         let mut new: Vec<usize> = (0..levels.len()).filter(is_new).collect();
         new.sort_by_cached_key(|i| (levels[*i], along_cubes(source.layout().block(*i))));
-        let coding = coding_of(source);
-        let fetched: Vec<Vec<u8>> =
+        let coding = coding_of(source).brought(self.upload);
+        let fetched: Vec<Chunk> =
             new.par_iter().map(|i| fetch(source, &coding, *i, levels[*i])).collect::<Result<_, _>>()?;
         let surface = match companions.contains(&Companion::SurfaceNormal) {
             true => Some(self.surface_after(source, transfer)?),
@@ -240,7 +248,7 @@ impl Held {
         format: SampleFormat,
         new: &[usize],
         levels: &[Level],
-        fetched: Vec<Vec<u8>>,
+        fetched: Vec<Chunk>,
     ) {
         for i in new {
             if let (BlockSamples::Texture(texel), Arrangement::Packed(packing)) =
@@ -250,15 +258,15 @@ impl Held {
             }
         }
         // The largest first: then none of them is cut for a smaller one while others wait.
-        let mut order: Vec<(usize, Vec<u8>)> = new.iter().copied().zip(fetched).collect();
+        let mut order: Vec<(usize, Chunk)> = new.iter().copied().zip(fetched).collect();
         order.sort_by_key(|(i, _)| cube_level(layout, *i, levels[*i]));
-        for (i, bytes) in order {
-            let is_one = bytes.len() == format.n_bytes() && self.dense_level().is_none();
+        for (i, chunk) in order {
+            let is_one = chunk.bytes().len() == format.n_bytes() && self.dense_level().is_none();
             let samples = match is_one {
-                true => BlockSamples::One(format.read(&bytes, 0) as f32),
+                true => BlockSamples::One(format.read(chunk.bytes(), 0) as f32),
                 false => BlockSamples::Texture(self.arrangement.take(layout, i, levels[i])),
             };
-            self.chunks[i] = (!is_one).then(|| Arc::new(Chunk::new(bytes)));
+            self.chunks[i] = (!is_one).then(|| Arc::new(chunk));
             self.rows[i] = BlockRow { level: levels[i], samples };
         }
     }
@@ -306,7 +314,7 @@ impl Held {
 
 /// The same bytes as another content.
 fn moved(chunk: &Option<Arc<Chunk>>) -> Option<Arc<Chunk>> {
-    chunk.as_ref().map(|chunk| Arc::new(Chunk::new(chunk.bytes())))
+    chunk.as_ref().map(|chunk| Arc::new(chunk.renewed()))
 }
 
 /// At most four bytes, the first the lowest.
@@ -326,11 +334,12 @@ fn merged(one: &[usize], other: &[usize]) -> Vec<usize> {
     blocks
 }
 
-fn copied(new: &[usize], fetched: &[Vec<u8>], beside: &[FetchedCompanions]) -> Copied {
-    let n_bytes = |bytes: &[Vec<u8>]| bytes.iter().map(Vec::len).sum::<usize>();
+fn copied(new: &[usize], fetched: &[Chunk], beside: &[FetchedCompanions]) -> Copied {
+    let of_values = fetched.iter().map(|chunk| chunk.bytes().len());
+    let of_companions = beside.iter().flat_map(|own| own.bytes.iter().map(Vec::len));
     Copied {
         n_bricks: beside.iter().map(|own| own.blocks.len()).fold(new.len(), usize::max),
-        n_bytes: n_bytes(fetched) + beside.iter().map(|own| n_bytes(&own.bytes)).sum::<usize>(),
+        n_bytes: of_values.chain(of_companions).sum(),
     }
 }
 
@@ -434,10 +443,10 @@ fn ranges(source: &dyn BlockSource) -> BlockRanges {
     BlockRanges::new(reads.collect())
 }
 
-fn fetch(source: &dyn BlockSource, coding: &Coding, ordinal: usize, level: Level) -> Result<Vec<u8>, FetchError> {
-    let mut bytes = Vec::new();
-    source.fetch(source.layout().block(ordinal), level, &mut bytes)?;
-    Ok(coding.encode(bytes))
+fn fetch(source: &dyn BlockSource, coding: &Coding, ordinal: usize, level: Level) -> Result<Chunk, FetchError> {
+    let (mut bytes, block) = (Vec::new(), source.layout().block(ordinal));
+    source.fetch(block, level, &mut bytes)?;
+    Ok(coding.chunk(source.layout().n_samples(block, level), bytes))
 }
 
 #[cfg(test)]

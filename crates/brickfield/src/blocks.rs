@@ -90,6 +90,7 @@ pub fn prepare_blocks(
     let Course { domain, sampling, rays } = Course::new(source.grid(), scene, coarsest)?;
     let is_coarse = coarsest > Level(0);
     let companions = companions(scene, style.classification).filter(|c| is_coarse || *c != Companion::Spread);
+    residency.serve(scene.upload);
     residency.hold(source, levels, &companions.collect::<Vec<_>>(), &scene.transfer)?;
     let style = match scene.quality {
         Quality::Final => style,

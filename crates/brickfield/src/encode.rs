@@ -1,7 +1,8 @@
 //! From samples as they are stored to samples as a backend reads them.
 
+use brickfield_core::glam::UVec3;
 use brickfield_core::{Rescale, ScalarType, ValueRange};
-use brickfield_frame::{Decode, SampleFormat};
+use brickfield_frame::{Chunk, Decode, SampleFormat, Upload};
 
 /// How the samples of a source are held for a backend.
 #[derive(Clone, Copy, Debug)]
@@ -11,13 +12,20 @@ pub(crate) struct Coding {
     pub(crate) format: SampleFormat,
     /// From a texture read to the stored number.
     pub(crate) stored: Decode,
+    /// How they are brought to a device.
+    pub(crate) upload: Upload,
 }
 
 impl Coding {
     /// Of samples of a type, with a map to values, and values in a range.
     pub(crate) fn of(scalar: ScalarType, rescale: Rescale, range: ValueRange) -> Coding {
         let (format, stored) = SampleFormat::encoding(scalar, rescale.stored_range(range));
-        Coding { scalar, rescale, format, stored }
+        Coding { scalar, rescale, format, stored, upload: Upload::Plain }
+    }
+
+    /// The same, brought to a device in a way.
+    pub(crate) fn brought(self, upload: Upload) -> Coding {
+        Coding { upload, ..self }
     }
 
     /// From a texture read to the value.
@@ -25,9 +33,10 @@ impl Coding {
         self.stored.rescaled(self.rescale)
     }
 
-    /// Little-endian samples in the form of a backend.
-    pub(crate) fn encode(&self, bytes: Vec<u8>) -> Vec<u8> {
-        encode(bytes, self.scalar, self.format, self.stored)
+    /// Little-endian samples, x fastest, in the form of a backend.
+    pub(crate) fn chunk(&self, extent: UVec3, bytes: Vec<u8>) -> Chunk {
+        let samples = encode(bytes, self.scalar, self.format, self.stored);
+        Chunk::of_samples(extent, self.format, samples, self.upload)
     }
 }
 

@@ -73,7 +73,7 @@ pub const MAX_SEGMENTS: u32 = 1 << 24;
 /// A picture size, step, clip box, data value or number of bricks out of range.
 pub fn prepare(tree: &BrickTree, scene: &Scene, residency: &mut Residency) -> Result<FramePlan, PrepareError> {
     check_size(scene.size)?;
-    residency.serve(tree);
+    residency.serve(tree, scene.upload);
     if let Some(plan) = residency.plan_of(scene) {
         return Ok(plan);
     }
@@ -98,7 +98,7 @@ pub fn prepare_selection(
     residency: &mut Residency,
 ) -> Result<FramePlan, PrepareError> {
     check_size(scene.size)?;
-    residency.serve(tree);
+    residency.serve(tree, scene.upload);
     plan_selection(tree, scene, selection, residency)
 }
 

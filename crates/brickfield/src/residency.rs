@@ -8,7 +8,7 @@ use brickfield_core::glam::UVec3;
 use brickfield_core::{BrickId, Level, TransferFunction};
 use brickfield_frame::{
     Chunk, DarkRegions, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, MacrocellRanges, Occupancy,
-    Places, Reach, Slots,
+    Places, Reach, Slots, Upload,
 };
 use rayon::prelude::*;
 
@@ -22,6 +22,7 @@ use crate::encode::Coding;
 #[derive(Debug, Default)]
 pub struct Residency {
     tree: Option<TreeId>,
+    upload: Upload,
     last: Option<(Scene, FramePlan)>,
     table: SlotTable,
     field: Option<Field>,
@@ -70,10 +71,10 @@ impl Residency {
         self.copied
     }
 
-    /// Begins anew if the tree is another.
-    pub(crate) fn serve(&mut self, tree: &BrickTree) {
-        if self.tree != Some(tree.id()) {
-            *self = Residency { tree: Some(tree.id()), ..Residency::default() };
+    /// Begins anew if the tree is another, or if its bricks are to be brought another way.
+    pub(crate) fn serve(&mut self, tree: &BrickTree, upload: Upload) {
+        if self.tree != Some(tree.id()) || self.upload != upload {
+            *self = Residency { tree: Some(tree.id()), upload, ..Residency::default() };
         }
         self.copied = Copied::default();
     }
@@ -100,7 +101,7 @@ impl Residency {
             return field.clone();
         }
         let range = tree.summary(tree.layout().root()).range;
-        let coding = Coding::of(tree.scalar_type(), tree.rescale(), range);
+        let coding = Coding::of(tree.scalar_type(), tree.rescale(), range).brought(self.upload);
         self.copied = self.table.hold(bricks, |id| gather(tree, id, &coding));
         let side = tree.layout().side();
         let slots = Slots::new(coding.format, coding.decode(), Places::Even(side), self.table.samples.clone());
@@ -229,5 +230,5 @@ fn gather(tree: &BrickTree, id: BrickId, coding: &Coding) -> Chunk {
     let samples = tree.samples(id);
     let mut bytes = vec![0; samples.n_bytes()];
     samples.copy_le_bytes(&mut bytes);
-    Chunk::new(coding.encode(bytes))
+    coding.chunk(UVec3::splat(tree.layout().side().n_samples()), bytes)
 }

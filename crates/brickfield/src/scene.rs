@@ -2,7 +2,7 @@
 
 use brickfield_core::glam::UVec2;
 use brickfield_core::{Aabb, Camera, TransferFunction};
-use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
+use brickfield_frame::{Division, Lengths, Mode, Placement, Target, Upload};
 use brickfield_lod::{Criterion, Culling, View};
 use brickfield_optics::{Light, QuadratureRule};
 
@@ -39,6 +39,8 @@ pub struct Scene {
     pub technique: Technique,
     /// Draft while the camera moves, final when it rests.
     pub quality: Quality,
+    /// How samples are brought to a device: as they are, or packed.
+    pub upload: Upload,
 }
 
 /// How much of a frame's time is spent on its looks.
@@ -88,7 +90,7 @@ pub enum Skipping {
 }
 
 impl Scene {
-    /// A scene with the defaults: no light, midpoint rule, exact mode, shells of whole rays, half a voxel a step, full resolution, no clipping, skipping.
+    /// A scene with the defaults: no light, midpoint rule, exact mode, shells of whole rays, half a voxel a step, full resolution, no clipping, skipping, plain samples.
     pub fn new(camera: Camera, size: UVec2, transfer: TransferFunction) -> Scene {
         Scene {
             camera,
@@ -106,6 +108,7 @@ impl Scene {
             skipping: Skipping::On,
             technique: Technique::RayCasting,
             quality: Quality::Final,
+            upload: Upload::Plain,
         }
     }
     /// The view for which bricks are selected. Without skipping, bricks outside the view are kept, too.

@@ -7,7 +7,7 @@ use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, BrickId, BrickLayout, BrickSide, Grid, Level, Place, Scalar, Volume, with_voxels};
 use brickfield_frame::{
     Chunk, DarkRegions, Drawing, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, KeptBoxes, Lighting,
-    Places, PlanError, PlanParts, QuadratureRule, Reach, Slices, Slots,
+    Places, PlanError, PlanParts, QuadratureRule, Reach, Slices, Slots, Upload,
 };
 use brickfield_lod::back_to_front;
 use brickfield_trim::{
@@ -148,6 +148,7 @@ struct Held {
     source: SourceId,
     trimming: Trimming,
     reach: u32,
+    upload: Upload,
     dark: DarkValues,
     /// What may be seen of each brick; what is read of it.
     trimmed: TrimmedBricks,
@@ -192,7 +193,9 @@ impl TrimResidency {
         reach: u32,
     ) -> Result<&mut Held, PrepareTrimmedError> {
         let dark = DarkValues::of(&scene.transfer);
-        let is_kept = |held: &Held| (held.source, held.trimming, held.reach) == (source.id, trimming, reach);
+        let is_kept = |held: &Held| {
+            (held.source, held.trimming, held.reach, held.upload) == (source.id, trimming, reach, scene.upload)
+        };
         let before = self.held.as_ref().filter(|held| is_kept(held));
         let (trimmed, n_changed) = match before {
             Some(held) if held.dark == dark => (None, 0),
@@ -207,7 +210,7 @@ impl TrimResidency {
             Some(trimmed) => {
                 let grown = trimmed.grown(reach);
                 let stored = store(&grown, trimming)?;
-                Some(Held::new(source, (trimming, reach), dark.clone(), (trimmed, grown, stored), before))
+                Some(Held::new(source, (trimming, reach, scene.upload), dark.clone(), (trimmed, grown, stored), before))
             }
             None => None,
         };
@@ -236,13 +239,13 @@ fn store(read: &TrimmedBricks, trimming: Trimming) -> Result<StoredBricks, Prepa
 impl Held {
     fn new(
         source: &TrimmedVolume,
-        (trimming, reach): (Trimming, u32),
+        (trimming, reach, upload): (Trimming, u32, Upload),
         dark: DarkValues,
         (trimmed, grown, stored): (TrimmedBricks, TrimmedBricks, StoredBricks),
         before: Option<&Held>,
     ) -> (Held, Copied) {
         let volume = &source.volume;
-        let coding = Coding::of(volume.scalar_type(), volume.rescale(), volume.range());
+        let coding = Coding::of(volume.scalar_type(), volume.rescale(), volume.range()).brought(upload);
         let kept_chunk = |i: usize| {
             let held = before?;
             held.chunks[i].clone().filter(|_| held.stored.places()[i] == stored.places()[i])
@@ -272,7 +275,23 @@ impl Held {
             None => (slots, kept, None),
         };
         let (slots, kept) = (Arc::new(slots), Arc::new(kept));
-        (Held { source: source.id, trimming, reach, dark, trimmed, grown, stored, chunks, slots, kept, index }, copied)
+        (
+            Held {
+                source: source.id,
+                trimming,
+                reach,
+                upload,
+                dark,
+                trimmed,
+                grown,
+                stored,
+                chunks,
+                slots,
+                kept,
+                index,
+            },
+            copied,
+        )
     }
 
     /// The field of the bricks that are drawn.
@@ -352,7 +371,7 @@ pub(crate) fn gather(volume: &Volume, coding: &Coding, place: &Place) -> Chunk {
         Scalar::copy_le_bytes(&samples, &mut bytes);
         bytes
     });
-    Chunk::new(coding.encode(bytes))
+    coding.chunk(place.n, bytes)
 }
 
 /// How many samples beside a visible one a frame reads: those of a gradient, and those at the other end of a segment.

@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use brickfield_conformance::codecs::{CodecsArgs, codecs};
 use brickfield_conformance::compare::{CompareArgs, compare, parse, say, short_of};
 use brickfield_conformance::lamar::{LamarArgs, lamar};
 use brickfield_conformance::left_out::{LeftOutArgs, left_out};
@@ -17,6 +18,9 @@ fn main() -> ExitCode {
     }
     if std::env::args().any(|word| word == "--left-out") {
         return of_left_out(&LeftOutArgs::parse());
+    }
+    if std::env::args().any(|word| word == "--codecs") {
+        return of_codecs(&CodecsArgs::parse());
     }
     let args = parse(std::env::args_os().collect()).unwrap_or_else(|e| e.exit());
     match compare(&args) {
@@ -63,6 +67,20 @@ fn of_paper(paper: &str) -> ExitCode {
             }
             let fails = findings.missed.iter().any(|missed| check.contains(&missed.kind));
             ExitCode::from(if fails { 4 } else { 0 })
+        }
+        Err(e) => {
+            eprintln!("compare: {e}");
+            ExitCode::from(e.status())
+        }
+    }
+}
+
+/// Codecs on this project's data.
+fn of_codecs(args: &CodecsArgs) -> ExitCode {
+    match codecs(args) {
+        Ok(findings) => {
+            findings.missed.iter().for_each(|missed| eprintln!("compare: missed: {}", missed.what));
+            ExitCode::from(if findings.missed.is_empty() { 0 } else { 4 })
         }
         Err(e) => {
             eprintln!("compare: {e}");

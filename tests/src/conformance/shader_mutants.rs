@@ -270,6 +270,16 @@ mutants! {
     STORED_ACROSS_BLOCKS: "stored-across-blocks", "field/blocks", "codes_at",
         "sum += weight * codes_among(samples_of(cell, blocks[cell_number(cell)]), cell, p);"
         => "sum += weight * codes_among(area.samples, area.cell, p);";
+    /// Packed coefficients have no sign.
+    UNPACKED_UNSIGNED: "unpacked-unsigned", "decode", "unzigzag", "i32(n >> 1u) ^ -i32(n & 1u)" => "i32(n >> 1u)";
+    /// Halves of details are rounded toward 0.
+    UNDONE_TOWARD_ZERO: "undone-toward-zero", "decode", "undo_line", "own - (detail >> 1u)" => "own - detail / 2";
+    /// Lines along x begin where lines along z do.
+    UNDONE_AXES: "undone-axes", "decode", "across_axis", "decoding.axis == 0u" => "decoding.axis == 2u";
+    /// Lossy values are not multiplied by their step.
+    UNPACKED_STEP: "unpacked-step", "decode", "sample", "value * brick.step" => "value";
+    /// Predictions are left out.
+    UNPREDICTED: "unpredicted", "decode", "undo_line", "is_predicted && n_low > 1u" => "false";
     /// Opacity is the depth.
     OPACITY_IS_DEPTH: "opacity-is-depth", "march", "march", "vec4f(seen.rgb, alpha(seen.w))" => "vec4f(seen.rgb, min(seen.w, 1.0))";
 }

@@ -72,11 +72,6 @@ impl Pipeline {
         self.bindings.iter().any(|b| b.resource == resource)
     }
 
-    /// Whether the shader has a binding of a kind.
-    pub(crate) fn has(&self, kind: BindingKind) -> bool {
-        self.bindings.iter().any(|b| b.kind == kind)
-    }
-
     /// Invocations along x, y, z of a workgroup.
     pub(crate) fn workgroup_size(&self) -> [u32; 3] {
         self.workgroup_size
@@ -134,7 +129,7 @@ impl Pipeline {
     fn lay_out(&mut self) -> Result<(), RenderError> {
         let stages = match self.entry {
             Entry::Proxy(_) => vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
-            Entry::March | Entry::Evaluate(_) | Entry::Probe(_) => vk::ShaderStageFlags::COMPUTE,
+            Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => vk::ShaderStageFlags::COMPUTE,
         };
         let binding = |b: &Binding| {
             vk::DescriptorSetLayoutBinding::default()
@@ -178,7 +173,7 @@ impl Pipeline {
         let module = module.of("vkCreateShaderModule")?;
         let made = match self.entry {
             Entry::Proxy(_) => self.compile_polygons(module, target),
-            Entry::March | Entry::Evaluate(_) | Entry::Probe(_) => self.compile_compute(module),
+            Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => self.compile_compute(module),
         };
         // SAFETY: a pipeline does not need its module any more.
         unsafe { device.raw().destroy_shader_module(module, None) };

@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use ash::vk;
 use brickfield_core::glam::UVec3;
+use brickfield_shaders::DecodedTexels;
 
 use super::image::{WHOLE, extent_3d};
 use super::{BoundPipeline, Buffer, Canvas, HostBuffer, VulkanImage};
@@ -38,12 +39,30 @@ pub(crate) enum Use {
     HostRead,
 }
 
-/// A box of an image, and where its texels lie in a buffer: x fastest, without gaps.
+/// A box of an image, and where its texels lie in a buffer: x fastest.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ImageBox {
     pub(crate) buffer_offset: u64,
+    /// Bytes from one row to the next; `None` without gaps. A slice follows the one before without a gap.
+    pub(crate) row_bytes: Option<u32>,
     pub(crate) origin: UVec3,
     pub(crate) extent: UVec3,
+}
+
+impl ImageBox {
+    /// The texels of a slot that was unpacked.
+    pub(crate) fn of(texels: &DecodedTexels) -> ImageBox {
+        let DecodedTexels { offset, row_bytes, origin, size } = *texels;
+        ImageBox { buffer_offset: offset, row_bytes: Some(row_bytes), origin, extent: size }
+    }
+
+    /// Bytes from its first texel to the end of its last one.
+    fn n_bytes(&self, texel_bytes: u64) -> u64 {
+        let [x, y, z] = self.extent.to_array().map(u64::from);
+        let own = x * texel_bytes;
+        let row = self.row_bytes.map_or(own, u64::from);
+        row * (y * z).saturating_sub(1) + own
+    }
 }
 
 impl<'q, 'a> Recorder<'q, 'a> {
@@ -87,11 +106,11 @@ impl<'q, 'a> Recorder<'q, 'a> {
     }
 
     /// Copies texels into an image that is a [`Use::CopyTarget`].
-    pub(crate) fn fill(&mut self, from: &'a HostBuffer, to: &'a VulkanImage, texel_bytes: u64, boxes: &[ImageBox]) {
-        let regions = regions(from.buffer(), to, texel_bytes, boxes);
+    pub(crate) fn fill(&mut self, from: &'a Buffer, to: &'a VulkanImage, texel_bytes: u64, boxes: &[ImageBox]) {
+        let regions = regions(from, to, texel_bytes, boxes);
         let layout = Use::CopyTarget.layout();
         // SAFETY: the boxes are inside both (asserted by `regions`), buffer and image outlive the run and allow copies.
-        unsafe { self.device.cmd_copy_buffer_to_image(self.commands, from.buffer().raw, to.raw, layout, &regions) };
+        unsafe { self.device.cmd_copy_buffer_to_image(self.commands, from.raw, to.raw, layout, &regions) };
     }
 
     /// Copies texels out of an image that is a [`Use::CopySource`].
@@ -221,11 +240,11 @@ impl Use {
 
 fn regions(buffer: &Buffer, image: &VulkanImage, texel_bytes: u64, boxes: &[ImageBox]) -> Vec<vk::BufferImageCopy> {
     let region = |b: &ImageBox| {
-        let texels: u64 = b.extent.to_array().into_iter().map(u64::from).product();
-        assert!(b.buffer_offset + texels * texel_bytes <= buffer.n_bytes(), "a copy past the end of a buffer");
+        assert!(b.buffer_offset + b.n_bytes(texel_bytes) <= buffer.n_bytes(), "a copy past the end of a buffer");
         assert!((b.origin + b.extent).cmple(image.extent()).all(), "a copy past the end of an image");
         vk::BufferImageCopy::default()
             .buffer_offset(b.buffer_offset)
+            .buffer_row_length(b.row_bytes.map_or(0, |row| row / texel_bytes as u32))
             .image_subresource(vk::ImageSubresourceLayers {
                 aspect_mask: vk::ImageAspectFlags::COLOR,
                 layer_count: 1,

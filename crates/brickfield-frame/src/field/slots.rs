@@ -137,6 +137,7 @@ pub struct Slots {
     decode: Decode,
     places: Places,
     samples: Vec<Option<Arc<Chunk>>>,
+    has_packed: bool,
     table: Option<Pages>,
     /// Of companions: the texel of each block that is one sample.
     ones: Option<Vec<u32>>,
@@ -160,6 +161,8 @@ pub enum SlotsError {
     Bricks { n_bytes: usize, brick_bytes: usize },
     #[error("slot {slot} has {n_bytes} bytes; its place has {expected}")]
     Bytes { slot: usize, n_bytes: usize, expected: usize },
+    #[error("slot {slot} has packed samples of {packed}; its place has {extent}")]
+    Packed { slot: usize, packed: UVec3, extent: UVec3 },
     #[error("{n_places} places for {n_slots} slots")]
     Places { n_places: usize, n_slots: usize },
     #[error("slot {slot} lies at {} to {} in a texture of {texels} texels", place.texel, place.texel + place.n)]
@@ -194,6 +197,7 @@ impl Slots {
             Places::Even(side) => {
                 let expected = side.n_samples_total() * format.n_bytes();
                 check_bytes(&samples, |_| expected)?;
+                check_packed(&samples, |_| UVec3::splat(side.n_samples()))?;
             }
             Places::Table { texels, places } => {
                 check_number(places.len(), samples.len())?;
@@ -202,11 +206,13 @@ impl Slots {
                     check_even(slot, place)?;
                 }
                 check_bytes(&samples, |slot| places[slot].n_samples() * format.n_bytes())?;
+                check_packed(&samples, |slot| places[slot].n)?;
             }
             Places::Blocks(places) => {
                 check_number(places.rows().len(), samples.len())?;
                 places.check()?;
                 check_bytes(&samples, |slot| places.n_texels(slot) * format.n_bytes())?;
+                check_packed(&samples, |slot| places.place(places.layout().block(slot)).n)?;
             }
         }
         let table = match &places {
@@ -217,7 +223,8 @@ impl Slots {
             }
             Places::Blocks(places) => Some(Pages::new(bytemuck::cast_slice(&places.packed()))),
         };
-        Ok(Slots { format, decode, places, samples, table, ones: None, id: ContentId::new() })
+        let has_packed = has_packed(&samples);
+        Ok(Slots { format, decode, places, samples, has_packed, table, ones: None, id: ContentId::new() })
     }
 
     /// The companions of these samples of flat blocks: each at its sample's texel, in a texture of their own.
@@ -237,8 +244,10 @@ impl Slots {
         check_number(places.rows().len(), samples.len())?;
         check_number(places.rows().len(), ones.len())?;
         check_bytes(&samples, |slot| places.n_texels(slot) * format.n_bytes())?;
+        check_packed(&samples, |slot| places.place(places.layout().block(slot)).n)?;
         let (places, table) = (self.places.clone(), Some(Pages::new(bytemuck::cast_slice(&ones))));
-        Ok(Slots { format, decode, places, samples, table, ones: Some(ones), id: ContentId::new() })
+        let has_packed = has_packed(&samples);
+        Ok(Slots { format, decode, places, samples, has_packed, table, ones: Some(ones), id: ContentId::new() })
     }
 
     /// Whether these are companions of other slots' samples.
@@ -355,6 +364,11 @@ impl Slots {
         self.samples.get(slot as usize)?.as_ref()
     }
 
+    /// Whether some slots are packed for devices.
+    pub fn has_packed(&self) -> bool {
+        self.has_packed
+    }
+
     /// The samples of all slots.
     pub fn all_samples(&self) -> &[Option<Arc<Chunk>>] {
         &self.samples
@@ -400,6 +414,18 @@ fn check_bytes(samples: &[Option<Arc<Chunk>>], expected: impl Fn(usize) -> usize
         }
     }
     Ok(())
+}
+
+fn has_packed(samples: &[Option<Arc<Chunk>>]) -> bool {
+    samples.iter().flatten().any(|chunk| chunk.packed().is_some())
+}
+
+fn check_packed(samples: &[Option<Arc<Chunk>>], extent: impl Fn(usize) -> UVec3) -> Result<(), SlotsError> {
+    let packed = |(slot, chunk): (usize, &Option<Arc<Chunk>>)| Some((slot, chunk.as_ref()?.packed()?.extent()));
+    match samples.iter().enumerate().filter_map(packed).find(|(slot, packed)| *packed != extent(*slot)) {
+        Some((slot, packed)) => Err(SlotsError::Packed { slot, packed, extent: extent(slot) }),
+        None => Ok(()),
+    }
 }
 
 impl Chunked for Slots {

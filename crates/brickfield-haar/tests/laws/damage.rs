@@ -3,7 +3,8 @@
 use brickfield_core::glam::UVec3;
 use brickfield_core::{Level, ScalarType};
 use brickfield_haar::{
-    BrickHeader, DecodeError, EncodeOptions, Kernel, Sample, Storage, Storages, decode, decode_level, encode,
+    BrickHeader, DecodeError, EncodeOptions, Kernel, LowBand, PackedBrick, Sample, Storage, Storages, decode,
+    decode_level, encode,
 };
 use proptest::prelude::*;
 
@@ -40,6 +41,11 @@ fn forged_bricks_keep_to_their_extent<T: Sample>() {
         if n_stated.is_ok_and(|n| n > 1 << 20) {
             return Ok(());
         }
+        if let Ok(packed) = PackedBrick::read(&forged) {
+            let n_numbers: usize = packed.sections().iter().map(|section| section.n_numbers).sum();
+            prop_assert_eq!(Ok(n_numbers as u64), n_stated);
+            prop_assert!(!matches!(decode::<T>(&forged), Err(DecodeError::Section { .. })));
+        }
         for level in [Level(0), Level(level)] {
             if let Ok(decoded) = decode_level::<T>(&forged, level) {
                 prop_assert_eq!(decoded.samples.len(), decoded.extent.element_product() as usize);
@@ -49,6 +55,32 @@ fn forged_bricks_keep_to_their_extent<T: Sample>() {
     });
 }
 for_all_types!(forged_bricks_keep_to_their_extent);
+
+/// Packed bricks open, and no others; a width beyond a coefficient's bits and groups that are too few do not.
+#[test]
+fn packed_bricks_open_if_their_groups_are_whole() {
+    let samples: Vec<u8> = (0..343).map(|i| (i * i % 251) as u8).collect();
+    let kernels = vec![Kernel::Haar];
+    let of = |storages| EncodeOptions { storages, kernels: kernels.clone(), ..EncodeOptions::default() };
+    let packed = encode(UVec3::splat(7), &samples, &of(Storages::Packed)).unwrap();
+    let opened = PackedBrick::read(&packed).unwrap();
+    let widths: Vec<usize> = opened.sections().iter().map(|section| section.widths.len()).collect();
+    assert_eq!(widths, [1, (343 - 64usize).div_ceil(64)]);
+    let header = opened.header().clone();
+    for (place, width) in [(0, 17), (0, 0), (1, 255)] {
+        let mut forged = packed.clone();
+        forged[if place == 0 { header.n_header_bytes() } else { header.n_bytes_of_level(Level(1)) }] = width;
+        sign(&mut forged, &header);
+        assert_eq!(PackedBrick::read(&forged), Err(DecodeError::Section { section: place }));
+    }
+    assert!(matches!(PackedBrick::read(&packed[..packed.len() - 1]), Err(DecodeError::Truncated { .. })));
+    let coded = encode(UVec3::splat(7), &[3u8; 343], &of(Storages::Smallest)).unwrap();
+    let (found, wanted) = (Storage::OneValue, Storage::Packed);
+    assert_eq!(PackedBrick::read(&coded), Err(DecodeError::Storage { found, wanted }));
+    let elsewhere = EncodeOptions { low_band: LowBand::Elsewhere, ..of(Storages::Packed) };
+    let elsewhere = encode(UVec3::splat(7), &samples, &elsewhere).unwrap();
+    assert_eq!(PackedBrick::read(&elsewhere), Err(DecodeError::LowBandElsewhere));
+}
 
 /// Sets all checksums, for a brick with the sections of another one.
 fn sign(brick: &mut [u8], original: &BrickHeader) {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use brickfield_bricks::SourceId;
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, BrickId, BrickLayout};
-use brickfield_frame::{Chunk, DarkRegions, Field, IndexGrid, Join, KeptBoxes, Places, Slots};
+use brickfield_frame::{Chunk, DarkRegions, Field, IndexGrid, Join, KeptBoxes, Places, Slots, Upload};
 use brickfield_trim::{
     DarkValues, Interpolation, PagedBrick, PagedBricks, TexelAccount, TrimmedBricks, merge_bricks, trim_bricks,
 };
@@ -158,10 +158,11 @@ impl TrimCache {
     ) -> Result<&mut Held, PrepareTrimmedError> {
         let dark = DarkValues::of(&scene.transfer);
         let is_kept = |held: &Held| {
-            (held.source, held.trimming, held.reach) == (source.id(), trimming, reach) && held.dark == dark
+            (held.source, held.trimming, held.reach, held.coding.upload) == (source.id(), trimming, reach, scene.upload)
+                && held.dark == dark
         };
         if !self.held.as_ref().is_some_and(is_kept) {
-            self.held = Some(Held::new(source, trimming, reach, dark, self.options)?);
+            self.held = Some(Held::new(source, (trimming, reach, scene.upload), dark, self.options)?);
         }
         Ok(self.held.as_mut().expect("bricks of before, or new ones"))
     }
@@ -202,13 +203,12 @@ fn grid_of(n: u64, page: UVec3) -> UVec3 {
 impl Held {
     fn new(
         source: &TrimmedVolume,
-        trimming: Trimming,
-        reach: u32,
+        (trimming, reach, upload): (Trimming, u32, Upload),
         dark: DarkValues,
         options: CacheOptions,
     ) -> Result<Held, PrepareTrimmedError> {
         let volume = source.volume();
-        let coding = Coding::of(volume.scalar_type(), volume.rescale(), volume.range());
+        let coding = Coding::of(volume.scalar_type(), volume.rescale(), volume.range()).brought(upload);
         let layout = *source.layout();
         let trimmed = trim_bricks(source.arrays(), &dark, Interpolation::Trilinear);
         let grown = trimmed.grown(reach);

@@ -2,7 +2,7 @@
 
 use brickfield_bricks::{BlockSource, FetchError, fetch_values};
 use brickfield_core::{Level, TransferFunction, Volume};
-use brickfield_frame::{Division, Lengths, Mode, Placement, Target};
+use brickfield_frame::{Division, Lengths, Mode, Placement, Target, Upload};
 use brickfield_optics::{NarrowPeak, QuadratureRule, changes_across, narrow_peak, narrow_peak_of};
 use clap::Args;
 
@@ -42,6 +42,10 @@ pub struct SamplingOptions {
     /// final, or draft (steps of twice the length, and of flat blocks the nearest one alone): while the camera moves
     #[arg(long, value_name = "WHICH", default_value = "final", value_parser = values::quality)]
     pub quality: Quality,
+    /// How samples are brought to a device: plain, or packed[=ERROR] (in groups of numbers that the device unpacks, where that is fewer
+    /// bytes; with ERROR, 0, a sample may be so many stored integers off)
+    #[arg(long, value_name = "HOW", default_value = "plain", value_parser = values::upload)]
+    pub upload: Upload,
     /// Upload and sample transparent bricks too (to measure what leaving them out saves)
     #[arg(long)]
     pub no_skip: bool,
@@ -111,6 +115,7 @@ impl SamplingOptions {
             lengths: self.lengths,
             technique,
             quality: self.quality,
+            upload: self.upload,
             skipping: if self.no_skip { Skipping::Off } else { Skipping::On },
             ..scene
         })

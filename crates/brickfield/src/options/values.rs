@@ -4,7 +4,7 @@
 use brickfield_bricks::Downsampling;
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Aabb, BlockSide, BrickSide, Interblock, Level, ScalarType, WorldPos};
-use brickfield_frame::{Division, Join, Lengths, Mode, Placement, Slices, Target};
+use brickfield_frame::{Division, Join, Lengths, Mode, Placement, Slices, Target, Upload};
 use brickfield_io::{ByteOrder, RawSpec};
 use brickfield_lod::Criterion;
 use brickfield_optics::{LightSource, LitSides, Normals, QuadratureRule};
@@ -111,6 +111,18 @@ pub fn quality(text: &str) -> Result<Quality, String> {
         "draft" => Ok(Quality::Draft),
         _ => Err("final or draft".to_owned()),
     }
+}
+
+/// How samples are brought to a device.
+pub fn upload(text: &str) -> Result<Upload, String> {
+    let packed = |max_error| Upload::Packed { max_error };
+    match text.split_once('=') {
+        None if text == "plain" => Some(Upload::Plain),
+        None if text == "packed" => Some(packed(0)),
+        Some(("packed", error)) => error.parse().map(packed).ok(),
+        _ => None,
+    }
+    .ok_or_else(|| format!("{text:?} is not plain or packed[=ERROR] with ERROR a whole number 0 to {}", u16::MAX))
 }
 
 /// What is drawn inside transparent blocks.

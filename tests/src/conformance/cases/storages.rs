@@ -1,19 +1,22 @@
 //! Fields through a table of places: slots of several sizes, resolutions and axes, and averages between samples.
 
+use brickfield::BlockStyle;
 use brickfield::bricks::Downsampling;
-use brickfield::frame::{Division, Mode, Placement};
+use brickfield::frame::{Division, Join, Mode, Placement, Upload};
 use brickfield::lod::Criterion;
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Grid, ScalarType};
+use brickfield_core::{BlockSide, BrickSide, Grid, Interblock, ScalarType};
 use brickfield_optics::QuadratureRule;
 
 use super::fields::{COOL, WARM, hills, knot, ramp, soft, sparse};
-use super::setup::{Setup, catches, picture};
+use super::setup::{FlatLevels, Setup, catches, picture};
 use crate::conformance::case::Case;
 use crate::conformance::plan_mutants::PlanMutant::*;
 use crate::conformance::shader_mutants as shader;
 use crate::conformance::storage::Storage;
 use crate::volumes::spread;
+
+const PACKED: Upload = Upload::Packed { max_error: 0 };
 
 fn grid() -> Grid {
     Grid::axis_aligned(UVec3::new(71, 66, 53), DVec3::ONE).expect("a grid")
@@ -54,6 +57,24 @@ pub(super) fn cases() -> Vec<Case> {
         }),
         picture("storage/placed-fast", catches![shader::PLACED_AXES, shader::HALF_TEXEL], || {
             placed(ScalarType::U16).with(|s| s.mode = Mode::FAST)
+        }),
+        picture("storage/packed", catches![shader::UNPACKED_UNSIGNED, shader::UNDONE_AXES, DecodeOffset], || {
+            Setup::new(hills(&grid(), ScalarType::I16), soft(ScalarType::I16)).with(|s| s.upload = PACKED)
+        }),
+        picture("storage/packed-u8", catches![shader::UNDONE_TOWARD_ZERO, shader::UNPREDICTED], || {
+            Setup::new(hills(&grid(), ScalarType::U8), soft(ScalarType::U8)).side(BrickSide::S32).with(|s| {
+                (s.upload, s.rule) = (PACKED, QuadratureRule::PreIntegrated);
+            })
+        }),
+        picture("storage/packed-lossy-levels", catches![shader::UNPACKED_STEP], || {
+            from_near(Setup::new(hills(&grid(), ScalarType::U16), soft(ScalarType::U16)))
+                .with(|s| (s.upload, s.mode) = (Upload::Packed { max_error: 40 }, Mode::FAST))
+        }),
+        picture("storage/packed-blocks", catches![shader::UNPACKED_UNSIGNED, shader::UNDONE_AXES], || {
+            let style = BlockStyle { join: Join::Blend(Interblock::MaximumDistance), ..BlockStyle::default() };
+            Setup::new(hills(&grid(), ScalarType::I8), soft(ScalarType::I8))
+                .blocks(BlockSide::V16, FlatLevels::Random, style)
+                .with(|s| s.upload = PACKED)
         }),
         picture("storage/averages", catches![shader::PLACED_FIRST, shader::PLACED_SCALE, AnchorHalfVoxel], || {
             let volume = ramp(&Grid::axis_aligned(UVec3::new(61, 47, 33), DVec3::ONE).expect("a grid"));
