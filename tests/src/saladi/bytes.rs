@@ -67,10 +67,7 @@ pub(super) fn run(args: &SaladiArgs, rivals: &mut Rivals) -> Result<Vec<Missed>,
         let opened = open(&path, &OpenOptions::default())?;
         let volume = Arc::new(opened.volume);
         let camera = Viewpoint::default().camera(volume.grid(), opened.frame, args.common.size)?;
-        let scene = Scene {
-            step_voxels: args.common.step,
-            ..Scene::new(camera, args.common.size, automatic(&volume))
-        };
+        let scene = Scene { step_voxels: args.common.step, ..Scene::new(camera, args.common.size, automatic(&volume)) };
         let slices = peer_slices(&volume)?;
         let half = 0.25 * volume.grid().dims().as_dvec3();
         let region = Aabb { min: half, max: 3.0 * half };

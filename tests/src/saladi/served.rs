@@ -53,15 +53,15 @@ pub(super) fn run(args: &SaladiArgs, rivals: &mut Rivals) -> Result<Vec<Missed>,
         "Over 30 Mbit/s, 10 ms before each answer, in this process. Times are of fetching and decoding to the moment when a picture can be drawn;\n\
          drawing is not in them. Region: the middle half along each axis.\n",
     )?;
-    print("data                 codec  first picture        region   all that shows     everything  ms\n                            KiB, requests")?;
+    print(
+        "data                 codec  first picture        region   all that shows     everything  ms\n                            KiB, requests",
+    )?;
     let (mut rows, mut missed) = (Vec::new(), Vec::new());
     for (name, path) in files(args)? {
         let opened = open(&path, &OpenOptions::default())?;
         let camera = Viewpoint::default().camera(opened.volume.grid(), opened.frame, args.common.size)?;
-        let scene = Scene {
-            step_voxels: args.common.step,
-            ..Scene::new(camera, args.common.size, automatic(&opened.volume))
-        };
+        let scene =
+            Scene { step_voxels: args.common.step, ..Scene::new(camera, args.common.size, automatic(&opened.volume)) };
         let half = 0.25 * opened.volume.grid().dims().as_dvec3();
         let region = Aabb { min: half, max: 3.0 * half };
         for codec in [Codec::Haar, Codec::Zstd] {
@@ -82,13 +82,7 @@ fn slow_link() -> ServeOptions {
     ServeOptions { throttle: Some(throttle), ..ServeOptions::default() }
 }
 
-fn timed(
-    data: &str,
-    codec: Codec,
-    store: &Path,
-    scene: &Scene,
-    region: &Aabb,
-) -> Result<ServedRow, PaperError> {
+fn timed(data: &str, codec: Codec, store: &Path, scene: &Scene, region: &Aabb) -> Result<ServedRow, PaperError> {
     let server = Server::start(store, slow_link())?;
     let client = Client::open(server.url(), FetchOptions::default())?;
     let mut row =
@@ -117,12 +111,7 @@ fn print_row(row: &ServedRow) -> Result<(), PaperError> {
 }
 
 /// Everything, over a link that fails: the picture is the same, or the failure is reported.
-fn with_faults(
-    backend: &mut dyn Backend,
-    data: &str,
-    store: &Path,
-    scene: &Scene,
-) -> Result<Vec<Missed>, PaperError> {
+fn with_faults(backend: &mut dyn Backend, data: &str, store: &Path, scene: &Scene) -> Result<Vec<Missed>, PaperError> {
     let good = delivered(backend, store, Faults::default(), scene)?.0;
     let mut missed = Vec::new();
     for (what, faults) in faults() {
@@ -131,7 +120,9 @@ fn with_faults(
             Ok((image, n_retries)) => {
                 let difference = greatest_difference(&image, &good);
                 if difference != 0.0 || ends_badly {
-                    missed.push(Missed::of_pictures(format!("{data}: {what}: a picture that differs by {difference:.1e}")));
+                    missed.push(Missed::of_pictures(format!(
+                        "{data}: {what}: a picture that differs by {difference:.1e}"
+                    )));
                 }
                 format!("the same picture (difference {difference}), {n_retries} retries")
             }

@@ -289,7 +289,10 @@ mod tests {
     fn a_region_of_interest_comes_before_what_gains_more() {
         let (much, all) = (SEEN.map(|error| 9.0 * error), vec![1.0; 2]);
         assert_eq!(order([much, SEEN], &[all.clone()]).items, [2, 0, 1]);
-        assert_eq!(order([much, SEEN], &[vec![0.0, 1.0], all]), FetchOrder { items: vec![2, 1, 0], phase_ends: vec![2, 3] });
+        assert_eq!(
+            order([much, SEEN], &[vec![0.0, 1.0], all]),
+            FetchOrder { items: vec![2, 1, 0], phase_ends: vec![2, 3] }
+        );
     }
 
     /// Level 1 gains nothing of its own here; details are of no use without it.

@@ -42,7 +42,8 @@ impl Chunks {
         for StoredChunk { first, extent, bytes, n_bytes } in levels.stored_chunks(stored)? {
             let (low, high) = (first << shifts, ((first + extent) << shifts).min(layout.dims()));
             let side = UVec3::splat(layout.side().n_voxels());
-            let is_whole = (low % side == UVec3::ZERO) && (0..3).all(|i| high[i] == layout.dims()[i] || high[i] % side[i] == 0);
+            let is_whole =
+                (low % side == UVec3::ZERO) && (0..3).all(|i| high[i] == layout.dims()[i] || high[i] % side[i] == 0);
             if !is_whole {
                 return Err(DeliveryError::Chunks { level: stored, first, extent, side: layout.side() });
             }

@@ -47,9 +47,13 @@ pub enum DeliveryError {
     Document { key: String, source: io::Error },
     #[error("{key} is not there: it is no store of brickfield")]
     NoDocument { key: String },
-    #[error("{location}: it was not packed by brickfield, and has no summaries of blocks: `brickfield pack` makes such a store")]
+    #[error(
+        "{location}: it was not packed by brickfield, and has no summaries of blocks: `brickfield pack` makes such a store"
+    )]
     NotPacked { location: String },
-    #[error("level {level} has a chunk of {extent} samples from {first} on, which holds no whole blocks of {side} voxels")]
+    #[error(
+        "level {level} has a chunk of {extent} samples from {first} on, which holds no whole blocks of {side} voxels"
+    )]
     Chunks { level: usize, first: UVec3, extent: UVec3, side: BlockSide },
     #[error(transparent)]
     Estimate(#[from] EstimateError),
@@ -185,7 +189,8 @@ impl Delivery {
         let errors = BlockErrors::estimate(&layout, self.blocks.summaries(), &scene.transfer, slab)?;
         let view = BlockView { view: scene.view(), clip: scene.clip, importance: Importance::default() };
         let seen = block_weights(&layout, &grid, &view);
-        let mut phases: Vec<Vec<f32>> = region.map(|region| weights_within(region, &layout, &seen)).into_iter().collect();
+        let mut phases: Vec<Vec<f32>> =
+            region.map(|region| weights_within(region, &layout, &seen)).into_iter().collect();
         phases.push(seen);
         let order = fetch_order(&layout, errors.levels(), &phases, self.known, &chunks.items)?;
         Ok(DeliveryPlan { items: chunks.items, bytes: chunks.bytes, order, n_fetched: 0 })
@@ -274,7 +279,8 @@ impl DeliveryPlan {
 /// The level that is fetched whole: the finest of few bytes, else the coarsest that blocks have.
 fn overview_level(levels: &ZarrLevels) -> Level {
     let scalar_bytes = levels.facts().scalar.n_bytes() as u64;
-    let n_bytes = |level: &Level| levels.dims(finest_above(levels, *level)).as_u64vec3().element_product() * scalar_bytes;
+    let n_bytes =
+        |level: &Level| levels.dims(finest_above(levels, *level)).as_u64vec3().element_product() * scalar_bytes;
     SIDE.levels().find(|level| n_bytes(level) <= OVERVIEW_BYTES).unwrap_or(SIDE.one_sample())
 }
 

@@ -41,8 +41,7 @@ pub(crate) fn render(args: &RenderArgs, kib: f64, backend: &mut dyn Backend) -> 
         while delivery.fetch(plan, most.saturating_sub(delivery.n_bytes()))? > 0 {}
     }
     let mut residency = BlockResidency::default();
-    let frame_plan =
-        prepare_blocks(delivery.blocks(), &scene, delivery.levels(), args.flat.style(), &mut residency)?;
+    let frame_plan = prepare_blocks(delivery.blocks(), &scene, delivery.levels(), args.flat.style(), &mut residency)?;
     let frame = backend.render(&frame_plan)?;
     finish(args, backend, &scene, (&frame_plan, &frame))?;
     print(&summary(&delivery, plan.as_ref()))?;
