@@ -1,7 +1,10 @@
 //! Codecs on this project's data.
 //!
+//! - `table`: ratios and speeds of brickfield-haar next to zstd, pco and standard codecs of pictures.
 //! - `upload`: packed bricks, which the device unpacks, next to plain ones: bytes, times, equal pictures.
 
+pub(crate) mod peers;
+mod table;
 mod upload;
 
 use std::path::PathBuf;
@@ -44,6 +47,8 @@ pub struct CodecsArgs {
 /// The parts of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Part {
+    /// Ratios and speeds, next to other codecs
+    Table,
     /// Packed bricks that the device unpacks, next to plain ones
     Upload,
 }
@@ -52,6 +57,7 @@ impl Part {
     /// A heading.
     pub const fn title(self) -> &'static str {
         match self {
+            Part::Table => "Lossless ratios and speeds",
             Part::Upload => "Packed bricks, unpacked by the device",
         }
     }
@@ -91,6 +97,7 @@ pub fn codecs(args: &CodecsArgs) -> Result<Findings, PaperError> {
     for part in args.parts() {
         print(&format!("\n## {}\n", part.title()))?;
         findings.missed.extend(match part {
+            Part::Table => table::run(args)?,
             Part::Upload => upload::run(args, &mut rivals)?,
         });
     }

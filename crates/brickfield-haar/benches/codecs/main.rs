@@ -1,6 +1,7 @@
 //! Sizes and speeds of this codec, zstd and pco on bricks of 32^3 of real volumes: `cargo bench -p brickfield-haar`.
 //!
-//! Needs `BRICKFIELD_DATA`, the folder of the project's volumes. `-- --volume NAME` measures one volume only, `-- --codec TEXT` the
+//! Needs `BRICKFIELD_DATA`, the folder of the project's volumes. `-- --volume NAME` measures one volume only, `-- --raw FILE --dims NXxNYxNZ
+//! --type TYPE` a file of samples (u8, i8, u16, i16, little-endian, x fastest; signed ones are counted from the least), `-- --codec TEXT` the
 //! codecs with this text in their names. Each speed is measured in as many turns as fit in half a second, or in `-- --seconds S`, three at
 //! least.
 
@@ -11,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use contestants::{Contestant, contestants};
 use rayon::prelude::*;
-use volumes::{Bricks, NAMES, bricks_of};
+use volumes::{Bricks, NAMES, bricks_of, bricks_of_raw};
 
 fn main() {
     let args: Vec<String> = std::env::args().collect();
@@ -19,16 +20,25 @@ fn main() {
     let (volume, codec) = (value("--volume"), value("--codec").unwrap_or_default());
     let seconds = value("--seconds").map_or(Ok(0.5), |s| s.parse()).expect("--seconds takes a number");
     let time = Duration::from_secs_f64(seconds);
+    if let Some(file) = value("--raw") {
+        let (dims, kind) = (value("--dims").unwrap_or_default(), value("--type").unwrap_or_default());
+        report_all(&file, bricks_of_raw(file.as_ref(), &dims, &kind), &codec, time);
+        return;
+    }
     let Ok(data) = std::env::var("BRICKFIELD_DATA") else {
         println!("BRICKFIELD_DATA is not set: no volume to measure");
         return;
     };
     for name in NAMES.iter().filter(|name| volume.as_deref().is_none_or(|v| v == **name)) {
-        match bricks_of(data.as_ref(), name) {
-            Ok(Bricks::U8(bricks)) => report(name, &bricks, contestants(), &codec, time),
-            Ok(Bricks::U16(bricks)) => report(name, &bricks, contestants(), &codec, time),
-            Err(error) => println!("{name}: {error}"),
-        }
+        report_all(name, bricks_of(data.as_ref(), name), &codec, time);
+    }
+}
+
+fn report_all(name: &str, bricks: Result<Bricks, String>, codec: &str, time: Duration) {
+    match bricks {
+        Ok(Bricks::U8(bricks)) => report(name, &bricks, contestants(), codec, time),
+        Ok(Bricks::U16(bricks)) => report(name, &bricks, contestants(), codec, time),
+        Err(error) => println!("{name}: {error}"),
     }
 }
 

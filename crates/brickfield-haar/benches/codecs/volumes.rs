@@ -45,6 +45,23 @@ pub(crate) fn bricks_of(data: &Path, name: &str) -> Result<Bricks, String> {
     })
 }
 
+/// The bricks of a file of samples.
+pub(crate) fn bricks_of_raw(file: &Path, dims: &str, kind: &str) -> Result<Bricks, String> {
+    let bytes = fs::read(file).map_err(|error| format!("{}: {error}", file.display()))?;
+    let numbers: Vec<u32> = dims.split('x').filter_map(|n| n.parse().ok()).collect();
+    let [x, y, z] = numbers[..] else { return Err(format!("--dims {dims:?} is no NXxNYxNZ")) };
+    let n = UVec3::new(x, y, z);
+    let words =
+        |flipped: u16| bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]]) ^ flipped).collect::<Vec<_>>();
+    Ok(match kind {
+        "u8" => Bricks::U8(cut(n, &bytes)?),
+        "i8" => Bricks::U8(cut(n, &bytes.iter().map(|byte| byte ^ 0x80).collect::<Vec<_>>())?),
+        "u16" => Bricks::U16(cut(n, &words(0))?),
+        "i16" => Bricks::U16(cut(n, &words(0x8000))?),
+        _ => return Err(format!("--type {kind:?} is none of u8, i8, u16, i16")),
+    })
+}
+
 fn inflated(mut decoder: impl Read) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     decoder.read_to_end(&mut bytes).map_err(|error| error.to_string())?;
