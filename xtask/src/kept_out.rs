@@ -20,6 +20,12 @@ const KEPT_OUT: &[(&str, &[&[&str]])] = &[
     // Zarr's metadata are JSON.
     ("brickfield-haar-zarrs", &[&["exr", "flate2", "image", "tempfile", "toml"], COLORS, COMMANDS, GRAPHICS]),
     ("brickfield-curvilinear", &[FILES, COLORS, COMMANDS, GRAPHICS]),
+    // `object_store` brings serde.
+    (
+        "brickfield-fetch",
+        &[&["exr", "flate2", "image", "tempfile", "toml", "reqwest", "rustls"], COLORS, COMMANDS, GRAPHICS],
+    ),
+    ("brickfield-serve", &[FILES, COLORS, COMMANDS, GRAPHICS, &["object_store"]]),
     ("brickfield-frame", &[FILES, COLORS, COMMANDS, GRAPHICS]),
     ("brickfield-shaders", &[FILES, COLORS, COMMANDS, &["ash", "wgpu"]]),
     ("brickfield-cpu", &[FILES, COLORS, COMMANDS, GRAPHICS]),

@@ -23,6 +23,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("brickfield-haar", &["core"]),
     ("brickfield-haar-zarrs", &["core", "haar"]),
     ("brickfield-curvilinear", &["core"]),
+    // It is tested against the server.
+    ("brickfield-fetch", &["core", "serve"]),
+    ("brickfield-serve", &[]),
     ("brickfield-frame", &["core", "optics"]),
     ("brickfield-shaders", &["core", "optics", "frame"]),
     ("brickfield-cpu", &["core", "optics", "interp", "frame"]),
@@ -45,6 +48,8 @@ const ALL: &[&str] = &[
     "trim",
     "haar",
     "curvilinear",
+    "fetch",
+    "serve",
     "frame",
     "shaders",
     "cpu",
@@ -62,6 +67,7 @@ const OWNED: &[(&str, &str)] = &[
     ("wgpu-hal", "brickfield-wgpu"),
     ("wgpu-types", "brickfield-wgpu"),
     ("ash", "brickfield-ash"),
+    ("object_store", "brickfield-fetch"),
 ];
 
 /// A package of the workspace: its name, its folder, and the names of its dependencies of all kinds.
@@ -188,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_owner_names_a_graphics_library() {
+    fn only_the_owner_names_a_library_that_it_hides() {
         let ash: (&str, &str, &[&str]) = ("brickfield-ash", "brickfield-ash", &["ash", "wgpu-hal"]);
         assert_eq!(check(&[ash]), ["brickfield-ash names wgpu-hal; only brickfield-wgpu may"]);
     }

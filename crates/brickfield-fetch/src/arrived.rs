@@ -237,7 +237,10 @@ mod tests {
     fn what_has_not_arrived_is_named_and_no_damage() {
         let arrived = Arrived::default();
         let error = arrived.read("c/0", &[0..4]).unwrap_err();
-        assert_eq!((error.kind(), error.to_string().as_str()), (io::ErrorKind::WouldBlock, "bytes 0..4 of c/0 not arrived"));
+        assert_eq!(
+            (error.kind(), error.to_string().as_str()),
+            (io::ErrorKind::WouldBlock, "bytes 0..4 of c/0 not arrived")
+        );
         arrived.insert("c/0", None, 0, &[1, 2, 3]).unwrap();
         assert_eq!(arrived.read("c/0", &[1..3]).unwrap(), Some(vec![vec![2, 3]]));
         let error = arrived.read("c/0", &[0..2, 2..5]).unwrap_err();

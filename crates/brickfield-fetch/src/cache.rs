@@ -47,7 +47,13 @@ impl Cache {
     }
 
     /// Adds bytes of an object, and removes what was used longest ago until all fit.
-    pub(crate) fn insert(&mut self, key: &Arc<str>, version: &Version, offset: u64, bytes: &[u8]) -> Result<(), Differs> {
+    pub(crate) fn insert(
+        &mut self,
+        key: &Arc<str>,
+        version: &Version,
+        offset: u64,
+        bytes: &[u8],
+    ) -> Result<(), Differs> {
         let new = || Known::Present { version: version.clone(), pieces: Pieces::default() };
         let object = self.objects.entry(key.clone()).or_insert_with(new);
         if let Known::Absent = object {
@@ -63,7 +69,12 @@ impl Cache {
     }
 
     /// Hands over the parts of a range that are kept; the parts that are not, in order.
-    pub(crate) fn take(&mut self, key: &Arc<str>, range: &Range<u64>, mut part: impl FnMut(u64, &[u8])) -> Vec<Range<u64>> {
+    pub(crate) fn take(
+        &mut self,
+        key: &Arc<str>,
+        range: &Range<u64>,
+        mut part: impl FnMut(u64, &[u8]),
+    ) -> Vec<Range<u64>> {
         let Some(Known::Present { pieces, .. }) = self.objects.get(key) else { return Pieces::default().gaps(range) };
         for kept in pieces.within(range) {
             part(kept.start, kept.bytes);

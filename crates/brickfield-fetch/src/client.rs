@@ -60,7 +60,8 @@ impl Client {
     pub fn open(location: impl AsRef<OsStr>, options: FetchOptions) -> Result<Client, FetchError> {
         options.check()?;
         let place = Place::open(location.as_ref(), &options)?;
-        let runtime = Builder::new_multi_thread().worker_threads(1).thread_name("brickfield-fetch").enable_all().build();
+        let runtime =
+            Builder::new_multi_thread().worker_threads(1).thread_name("brickfield-fetch").enable_all().build();
         Ok(Client {
             place,
             cache: Mutex::new(Cache::new(options.max_cache_bytes)),
@@ -98,7 +99,8 @@ impl Client {
 
     fn run(&self, requests: &[Request], target: &dyn Target) -> Result<FetchedCounts, FetchError> {
         let wanted = by_object(requests)?;
-        let call = Call { client: self, counts: Counts::default(), n_cached_bytes: 0.into(), n_absent: 0.into(), target };
+        let call =
+            Call { client: self, counts: Counts::default(), n_cached_bytes: 0.into(), n_absent: 0.into(), target };
         let result = self.wait(call.bring(&wanted));
         let counts = call.counted();
         self.total().add(&counts);
@@ -138,7 +140,10 @@ impl Drop for Client {
 
 impl std::fmt::Debug for Client {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Client").field("store", &self.place.store).field("options", &self.options).finish_non_exhaustive()
+        f.debug_struct("Client")
+            .field("store", &self.place.store)
+            .field("options", &self.options)
+            .finish_non_exhaustive()
     }
 }
 
@@ -233,7 +238,8 @@ impl Call<'_> {
             Found::Present(version) => Some(version),
             Found::Unknown => None,
         };
-        let ask = |range: Option<Range<u64>>| Asked { key: key.clone(), path: path.clone(), range, version: version.clone() };
+        let ask =
+            |range: Option<Range<u64>>| Asked { key: key.clone(), path: path.clone(), range, version: version.clone() };
         let Some(version) = &version else {
             let merged = merged(wanted.ranges.clone(), self.client.options.max_gap_bytes);
             return Ok(if wanted.whole { vec![ask(None)] } else { merged.into_iter().map(|r| ask(Some(r))).collect() });

@@ -22,7 +22,8 @@ pub(crate) struct Place {
 impl Place {
     /// Opens a folder, or a URL of scheme `file`, `http`, `https` or `s3`. Nothing is asked for yet.
     pub(crate) fn open(location: &OsStr, options: &FetchOptions) -> Result<Place, FetchError> {
-        let bad = |reason: String| FetchError::BadLocation { location: location.to_string_lossy().into_owned(), reason };
+        let bad =
+            |reason: String| FetchError::BadLocation { location: location.to_string_lossy().into_owned(), reason };
         let text = location.to_str().unwrap_or_default();
         let Some((scheme, rest)) = text.split_once("://") else { return folder(location).map_err(bad) };
         match scheme.to_ascii_lowercase().as_str() {

@@ -22,7 +22,11 @@ impl Pieces {
         pieces.filter_map(move |(&piece, bytes)| {
             let start = piece.max(range.start);
             let end = (piece + bytes.len() as u64).min(range.end);
-            (start < end).then(|| Part { piece, start, bytes: &bytes[(start - piece) as usize..(end - piece) as usize] })
+            (start < end).then(|| Part {
+                piece,
+                start,
+                bytes: &bytes[(start - piece) as usize..(end - piece) as usize],
+            })
         })
     }
 

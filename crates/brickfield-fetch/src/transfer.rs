@@ -310,7 +310,9 @@ fn fault(error: Error, seen: &Seen, asked: &Asked) -> Fault {
     let told = one_line(&error);
     match (&error, seen.answer()) {
         (Error::NotFound { .. }, _) => Fault::Absent,
-        (Error::PermissionDenied { .. } | Error::Unauthenticated { .. }, _) | (_, Answer::Final) => refused(asked, told),
+        (Error::PermissionDenied { .. } | Error::Unauthenticated { .. }, _) | (_, Answer::Final) => {
+            refused(asked, told)
+        }
         _ => Fault::Again(told),
     }
 }

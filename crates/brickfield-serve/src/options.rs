@@ -32,7 +32,7 @@ impl Default for ServeOptions {
 /// A slow link, shared by all connections.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Throttle {
-    /// Bits of answers per second, heads included; above 0.
+    /// Bits of answers per second, heads included; above 0. Infinite: latency alone.
     pub bits_per_second: f64,
     /// Wait of each request before its answer begins, beside the time on the link.
     pub latency: Duration,
@@ -148,8 +148,8 @@ impl ServeOptions {
             return bad(name, format!("{time:?}"), "above 0");
         }
         let speed = self.throttle.map_or(1.0, |throttle| throttle.bits_per_second);
-        if !(speed > 0.0 && speed.is_finite()) {
-            return bad("bits_per_second", speed.to_string(), "above 0 and finite");
+        if speed.is_nan() || speed <= 0.0 {
+            return bad("bits_per_second", speed.to_string(), "above 0");
         }
         if !(0.0..1.0).contains(&self.faults.cut_at) {
             return bad("cut_at", self.faults.cut_at.to_string(), "0 to below 1");
@@ -172,7 +172,7 @@ mod tests {
         assert_eq!(told(limits(never)), "head_timeout is 0ns; it must be above 0");
         let throttle = Some(Throttle { bits_per_second: 0.0, latency: Duration::ZERO });
         let slow = ServeOptions { throttle, ..ServeOptions::default() };
-        assert_eq!(told(slow), "bits_per_second is 0; it must be above 0 and finite");
+        assert_eq!(told(slow), "bits_per_second is 0; it must be above 0");
         let whole = ServeOptions { faults: Faults { cut_at: 1.0, ..Faults::default() }, ..ServeOptions::default() };
         assert_eq!(told(whole), "cut_at is 1; it must be 0 to below 1");
     }

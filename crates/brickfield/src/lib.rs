@@ -32,11 +32,15 @@ pub use blocks::{BlockStyle, Classification, PrepareBlocksError, TransparentBloc
 pub use brickfield_bricks as bricks;
 pub use brickfield_core as core;
 pub use brickfield_cpu as cpu;
+#[cfg(feature = "fetch")]
+pub use brickfield_fetch as fetch;
 pub use brickfield_frame as frame;
 pub use brickfield_interp as interp;
 pub use brickfield_io as io;
 pub use brickfield_lod as lod;
 pub use brickfield_optics as optics;
+#[cfg(feature = "serve")]
+pub use brickfield_serve as serve;
 pub use brickfield_trim as trim;
 #[cfg(feature = "formats")]
 pub use pack::{Codec, PackError, PackProgress, Packed, pack};

@@ -454,6 +454,38 @@ fn what_is_refused_is_named_and_leaves_nothing_behind() {
     }
 }
 
+#[cfg(all(feature = "serve", feature = "fetch"))]
+#[test]
+fn a_store_is_served_until_the_command_is_ended() {
+    use std::io::{BufRead, BufReader};
+
+    use brickfield::core::Objects;
+    use brickfield::fetch::{Client, FetchOptions};
+
+    let folder = WorkFolder::new();
+    let mut command = folder.command("serve|.|--address|127.0.0.1:0|--mbit|30|--latency-ms|0.5");
+    let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
+    let mut said = String::new();
+    BufReader::new(child.stdout.take().unwrap()).read_line(&mut said).unwrap();
+    let url = said.split_whitespace().next().unwrap();
+    assert!(url.starts_with("http://127.0.0.1:") && said.contains("for trying out"), "{said}");
+    let client = Client::open(url, FetchOptions::default()).unwrap();
+    let file = std::fs::read(folder.path().join("a.nrrd")).unwrap();
+    assert_eq!(client.read("a.nrrd", &[0..file.len() as u64]).unwrap(), Some(vec![file]));
+    child.kill().unwrap();
+    child.wait().unwrap();
+
+    for (words, told) in [
+        ("serve|gone", "cannot serve gone: "),
+        ("serve|.|--mbit|0", "it must be a finite number above 0"),
+        ("serve|.|--address|nowhere", "invalid socket address"),
+    ] {
+        let out = folder.run(words);
+        assert_eq!(out.status.code(), Some(2), "{words}");
+        assert!(text(&out.stderr).contains(told), "{words}: {}", text(&out.stderr));
+    }
+}
+
 #[test]
 fn a_reader_that_goes_away_is_no_failure() {
     let place = WorkFolder::new();

@@ -32,7 +32,8 @@ fn no_spelling_of_a_path_leads_outside() {
     let absolute = outer.path().join("secret");
     let ups = ["..", "%2e%2e", "%2E%2e", ".%2e", "%2e.", "%252e%252e", "%c0%ae%c0%ae", "%uff0e%uff0e", "..;", "...."];
     let slashes = ["/", "%2f", "%5c", "\\", "//", "/./"];
-    let mut paths = vec![format!("/{}", absolute.display()), absolute.display().to_string(), "/c/0%00/../../secret".into()];
+    let mut paths =
+        vec![format!("/{}", absolute.display()), absolute.display().to_string(), "/c/0%00/../../secret".into()];
     for up in ups {
         for slash in slashes {
             paths.extend([format!("/{up}{slash}secret"), format!("/c/{up}{slash}{up}{slash}secret")]);
@@ -75,11 +76,24 @@ fn links_lead_to_what_is_served_anyway() {
     let entry = outer.path().join("entry");
     symlink(&folder, &entry).unwrap();
     let server = Server::start(&entry, ServeOptions::default()).unwrap();
-    for path in
-        ["file", "up/secret", "up/store/c/0/..", "beside/secret", "twice", "shown", "endless", "broken", "circle", ".dot"]
-    {
+    for path in [
+        "file",
+        "up/secret",
+        "up/store/c/0/..",
+        "beside/secret",
+        "twice",
+        "shown",
+        "endless",
+        "broken",
+        "circle",
+        ".dot",
+    ] {
         let answer = get(&server, &format!("/{path}"));
-        assert_eq!((answer.status, answer.body.len()), (if path == "circle" { answer.status } else { 404 }, 0), "{path}");
+        assert_eq!(
+            (answer.status, answer.body.len()),
+            (if path == "circle" { answer.status } else { 404 }, 0),
+            "{path}"
+        );
         assert!(answer.status >= 400, "{path}");
     }
     for path in ["inside", "folder/0", "c/0"] {

@@ -34,7 +34,8 @@ fn a_head_that_is_too_large_is_refused() {
 #[test]
 fn no_request_is_answered_by_400() {
     let (_folder, server) = served(ServeOptions::default());
-    for nonsense in ["\r\n\r\n\r\nHELLO\r\n\r\n", "GET /c/0 HTTP/9.9\r\n\r\n", "\u{1}\u{2}\u{3}\r\n\r\n", "GET\r\n\r\n"] {
+    for nonsense in ["\r\n\r\n\r\nHELLO\r\n\r\n", "GET /c/0 HTTP/9.9\r\n\r\n", "\u{1}\u{2}\u{3}\r\n\r\n", "GET\r\n\r\n"]
+    {
         let answer = answer_to(server.address(), nonsense.as_bytes());
         assert!(answer.is_none_or(|answer| answer.status == 400), "{nonsense:?}");
     }

@@ -19,7 +19,10 @@ fn a_range_is_answered_by_its_bytes() {
         assert_eq!(answer.body, &object()[bytes], "{range}");
     }
     let head = ask(server.address(), "HEAD", "/c/0", "range: bytes=4-7\r\n");
-    assert_eq!((head.header("content-range"), head.header("content-length"), head.body.len()), ("bytes 4-7/1000", "4", 0));
+    assert_eq!(
+        (head.header("content-range"), head.header("content-length"), head.body.len()),
+        ("bytes 4-7/1000", "4", 0)
+    );
 }
 
 #[test]

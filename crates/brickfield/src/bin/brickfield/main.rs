@@ -5,6 +5,8 @@ mod info;
 #[cfg(feature = "formats")]
 mod pack;
 mod render;
+#[cfg(feature = "serve")]
+mod serve;
 
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
@@ -31,6 +33,7 @@ use clap::{Args, Parser, Subcommand};
   brickfield info scan.ome.tif --json
   brickfield convert dicom-folder/ -o head.nii.gz --series 1
   brickfield pack large.nrrd -o large.zarr
+  brickfield serve large.zarr --mbit 30 --latency-ms 10
   brickfield render head.nrrd -o head.png
   brickfield render dicom-folder/ -o head.exr --transfer ct-bone --camera \"front zoom=1.2\"
   brickfield render engine.vti -o inside.png --camera \"eye=80,100,60 target=200,128,60 up=0,0,1 fov=60\" --mode fast
@@ -56,6 +59,9 @@ enum Command {
     /// Packs a volume of any size as OME-Zarr 0.5 with all coarser levels, in bounded memory
     #[cfg(feature = "formats")]
     Pack(PackArgs),
+    /// Serves the files of a store to programs on this machine, for trying out: any web server, or S3, can do it
+    #[cfg(feature = "serve")]
+    Serve(ServeArgs),
     /// Lists the backends and their adapters, or why there are none
     Backends,
 }
@@ -101,6 +107,22 @@ struct PackArgs {
     codec: Codec,
     #[command(flatten)]
     input: InputOptions,
+}
+
+#[cfg(feature = "serve")]
+#[derive(Args)]
+struct ServeArgs {
+    /// Folder whose files are served, and nothing outside of it
+    store: PathBuf,
+    /// Where to listen; port 0 takes a free one. Other machines can read what is served at another address than this machine's own
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8080")]
+    address: std::net::SocketAddr,
+    /// Send as over a link of N Mbit/s, which all clients share
+    #[arg(long, value_name = "N", value_parser = values::positive, allow_hyphen_values = true)]
+    mbit: Option<f64>,
+    /// Let each request wait N ms for its answer
+    #[arg(long, value_name = "N", value_parser = values::positive, allow_hyphen_values = true)]
+    latency_ms: Option<f64>,
 }
 
 fn convert_help() -> String {
@@ -214,6 +236,8 @@ fn main() -> ExitCode {
         #[cfg(feature = "formats")]
         Command::Pack(args) => pack::run(&args),
         Command::Render(args) => render::run(&args),
+        #[cfg(feature = "serve")]
+        Command::Serve(args) => serve::run(&args),
         Command::Backends => print(&listed_backends()),
     };
     let Err(failure) = result else { return ExitCode::SUCCESS };

@@ -1,0 +1,6 @@
+//! Laws of the client, over real sockets.
+
+mod bad;
+mod faults;
+mod folder;
+mod scripted;
