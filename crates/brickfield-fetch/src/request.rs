@@ -69,6 +69,7 @@ pub(crate) fn merged(mut ranges: Vec<Range<u64>>, max_gap: u64) -> Vec<Range<u64
 }
 
 #[cfg(test)]
+#[expect(clippy::single_range_in_vec_init, reason = "a list of ranges may have one")]
 mod tests {
     use proptest::prelude::*;
 
