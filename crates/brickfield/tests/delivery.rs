@@ -30,7 +30,7 @@ fn volume() -> Volume {
 fn scene(volume: &Volume) -> Scene {
     let center = volume.grid().world_box().center();
     let projection = Projection::Orthographic { height: 140.0 };
-    let camera = Camera::new(center - 300.0 * DVec3::Z, center, DVec3::Y, projection).unwrap();
+    let camera = Camera::look_at(center - 300.0 * DVec3::Z, center, DVec3::Y, projection).unwrap();
     let knot = |value, extinction| Knot { value, extinction, color: [1.0; 3] };
     Scene::new(camera, UVec2::splat(16), TransferFunction::new(vec![knot(20.0, 0.0), knot(60.0, 0.3)]).unwrap())
 }
