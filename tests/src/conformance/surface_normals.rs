@@ -31,7 +31,7 @@ impl<'a> Values<'a> {
     /// The voxels of a volume.
     pub(crate) fn of(volume: &Volume, transfer: &'a TransferFunction) -> Values<'a> {
         let grid = volume.grid();
-        let values = (0..grid.n_voxels() as usize).map(|i| volume.value(i)).collect();
+        let values = (0..grid.n_voxels()).map(|i| volume.value(i)).collect();
         Values { values, dims: grid.dims(), spacing: grid.spacing(), transfer }
     }
 

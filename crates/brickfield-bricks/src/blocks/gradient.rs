@@ -66,13 +66,16 @@ impl Around {
     pub(super) fn of<T: Scalar>(Voxels { voxels, grid, rescale }: Voxels<T>, first: UVec3, extent: UVec3) -> Around {
         let (dims, n) = (grid.dims(), extent + 2);
         let beside = |axis: usize, i: u32| (first[axis] + i).saturating_sub(1).min(dims[axis] - 1);
-        let value = |p: UVec3| {
-            let [x, y, z] = [0, 1, 2].map(|axis| beside(axis, p[axis]) as usize);
-            rescale.value(voxels[x + dims.x as usize * (y + dims.y as usize * z)].to_f64())
-        };
+        let columns: Vec<usize> = (0..n.x).map(|i| beside(0, i) as usize).collect();
+        let rows = (0..n.z).flat_map(|k| (0..n.y).map(move |j| (j, k)));
+        let mut values = Vec::with_capacity(n.element_product() as usize);
+        for (y, z) in rows.map(|(j, k)| (beside(1, j) as usize, beside(2, k) as usize)) {
+            let row = &voxels[dims.x as usize * (y + dims.y as usize * z)..][..dims.x as usize];
+            values.extend(columns.iter().map(|x| rescale.value(row[*x].to_f64())));
+        }
         let distance = |axis: usize| move |i: u32| f64::from(beside(axis, i + 2) - beside(axis, i));
         let distances = [0, 1, 2].map(|axis| (0..extent[axis]).map(distance(axis)).collect());
-        Around { values: positions(n).map(value).collect(), n, distances }
+        Around { values, n, distances }
     }
 
     /// The slopes along the axes at a voxel of the block, in data values per voxel: weights 1, 2, 1 across (Sobel).

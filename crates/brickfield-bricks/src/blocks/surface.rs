@@ -26,6 +26,9 @@ use super::outside::OutsideValues;
 use super::positions;
 use super::source::{BlockSource, FetchError, SourceId};
 
+/// The normals of a block's voxels, x fastest.
+type Normals = Arc<[[u8; 4]]>;
+
 /// The normals of a source's surface voxels under a transfer function, at full resolution, in the form of
 /// [`Companion::SurfaceNormal`](brickfield_core::Companion::SurfaceNormal).
 ///
@@ -36,7 +39,7 @@ pub struct SurfaceNormals {
     layout: BlockLayout,
     outside: OutsideValues,
     /// Of each block, by number, the normals of its voxels, x fastest; `None` without a surface.
-    blocks: Vec<Option<Arc<[[u8; 4]]>>>,
+    blocks: Vec<Option<Normals>>,
 }
 
 /// The work that a transfer function made.
@@ -68,7 +71,7 @@ impl SurfaceNormals {
     /// Under another transfer function: what is the same as before is kept.
     ///
     /// A block is read only if values whose transparency changed lie in its range, or in that of a neighbour; of such a block a voxel is
-    /// computed only if its own transparency changed, or that of one of its 26 neighbours. About 0.1 us for each voxel that is read.
+    /// computed only if its own transparency changed, or that of one of its 26 neighbours.
     ///
     /// # Errors
     /// As [`BlockSource::fetch_around`].
@@ -145,14 +148,14 @@ struct EditedBlocks<'a> {
 /// A block of which normals may be others.
 struct EditedBlock {
     ordinal: usize,
-    normals: Option<Arc<[[u8; 4]]>>,
+    normals: Option<Normals>,
     n_examined: u64,
     n_recomputed: u64,
 }
 
 impl EditedBlocks<'_> {
     /// A block's normals, if they may be others than before.
-    fn edited(&self, ordinal: usize, before: &Option<Arc<[[u8; 4]]>>) -> Result<Option<EditedBlock>, FetchError> {
+    fn edited(&self, ordinal: usize, before: &Option<Normals>) -> Result<Option<EditedBlock>, FetchError> {
         let block = self.layout.block(ordinal);
         let (own, around) = (self.source.summaries()[ordinal].range, self.range_around(block));
         if !self.differing.meets(around) {
@@ -164,7 +167,12 @@ impl EditedBlocks<'_> {
         let mut values = Vec::new();
         self.source.fetch_around(block, &mut values)?;
         let voxels = Voxels { values, first: self.layout.first_voxel(block), extent: self.layout.extent(block) };
-        Ok(Some(self.of_voxels(ordinal, &voxels, before)))
+        let (concerned, n_examined) = (self.concerned(&voxels), u64::from(voxels.extent.element_product()));
+        let normals = match concerned.is_empty() {
+            true => before.clone(),
+            false => self.of_voxels(&voxels, &concerned, before),
+        };
+        Ok(Some(EditedBlock { ordinal, normals, n_examined, n_recomputed: concerned.len() as u64 }))
     }
 
     /// The least and the greatest value of a block and those beside it.
@@ -174,17 +182,30 @@ impl EditedBlocks<'_> {
         ranges.reduce(|a, b| ValueRange { min: a.min.min(b.min), max: a.max.max(b.max) }).expect("the block itself")
     }
 
-    fn of_voxels(&self, ordinal: usize, voxels: &Voxels, before: &Option<Arc<[[u8; 4]]>>) -> EditedBlock {
-        let all = |values: &OutsideValues| voxels.values.iter().map(|value| values.contains(*value)).collect();
-        let (is_outside, differs): (Vec<bool>, Vec<bool>) = (all(self.outside), all(&self.differing));
-        let (neighbours, mut n_recomputed) = (neighbours(voxels.extent), 0);
-        let normal = |(i, voxel): (usize, UVec3)| {
-            let at = voxels.at(voxel);
-            // A repeated outer voxel differs if the voxel that it repeats does, which is a neighbour or the voxel itself.
-            if !differs[at] && neighbours.iter().all(|n| !differs[n.of(at)]) {
-                return before.as_ref().map_or(NO_GRADIENT, |normals| normals[i]);
+    /// The voxels of a block whose own transparency changed, or that of a neighbour, x fastest. A repeated outer voxel stands for a
+    /// neighbour, or for the voxel itself.
+    fn concerned(&self, voxels: &Voxels) -> Vec<UVec3> {
+        let n = voxels.extent + 2;
+        let mut is_concerned = vec![false; voxels.extent.element_product() as usize];
+        let differing = voxels.values.iter().enumerate().filter(|(_, value)| self.differing.contains(**value));
+        for i in differing.map(|(i, _)| i as u32) {
+            // The first voxel of the block is the second one of those around it.
+            let p = UVec3::new(i % n.x, i / n.x % n.y, i / (n.x * n.y));
+            let (low, end) = (p.saturating_sub(UVec3::splat(2)), (p + 1).min(voxels.extent));
+            for (y, z) in (low.z..end.z).flat_map(|z| (low.y..end.y).map(move |y| (y, z))) {
+                let row = voxels.extent.x * (y + voxels.extent.y * z);
+                is_concerned[(row + low.x) as usize..(row + end.x) as usize].fill(true);
             }
-            n_recomputed += 1;
+        }
+        positions(voxels.extent).zip(is_concerned).filter(|(_, is)| *is).map(|(voxel, _)| voxel).collect()
+    }
+
+    /// The normals of a block, of which those of some voxels are computed.
+    fn of_voxels(&self, voxels: &Voxels, concerned: &[UVec3], before: &Option<Normals>) -> Option<Normals> {
+        let (extent, neighbours) = (voxels.extent, neighbours(voxels.extent));
+        let is_outside: Vec<bool> = voxels.values.iter().map(|value| self.outside.contains(*value)).collect();
+        let normal = |voxel: UVec3| {
+            let at = voxels.at(voxel);
             if is_outside[at] {
                 return NO_GRADIENT;
             }
@@ -192,10 +213,12 @@ impl EditedBlocks<'_> {
             let outside = neighbours.iter().filter(|n| is_outside[n.of(at)] && is_there(n));
             self.normal(outside.map(|n| (n.direction, (voxels.values[at] - voxels.values[n.of(at)]).abs())))
         };
-        let normals: Vec<[u8; 4]> = positions(voxels.extent).enumerate().map(normal).collect();
-        let has_surface = normals.iter().any(|normal| *normal != NO_GRADIENT);
-        let n_examined = u64::from(voxels.extent.element_product());
-        EditedBlock { ordinal, normals: has_surface.then(|| normals.into()), n_examined, n_recomputed }
+        let none = || vec![NO_GRADIENT; extent.element_product() as usize];
+        let mut normals = before.as_ref().map_or_else(none, |normals| normals.to_vec());
+        for voxel in concerned {
+            normals[(voxel.x + extent.x * (voxel.y + extent.y * voxel.z)) as usize] = normal(*voxel);
+        }
+        normals.iter().any(|normal| *normal != NO_GRADIENT).then(|| normals.into())
     }
 
     /// Whether the volume has a voxel.
