@@ -6,7 +6,7 @@ use std::sync::Arc;
 use brickfield::bricks::{BlockOptions, BrickTree, BuildOptions, build_blocks, build_tree};
 use brickfield::core::glam::{DVec3, UVec2, UVec3};
 use brickfield::core::{
-    BlockSide, BrickSide, Camera, Grid, Interblock, Knot, Level, Scalar, TransferFunction, Volume, WorldPos,
+    BlockSide, BrickSide, Camera, Grid, Interblock, Knot, Level, TransferFunction, Volume, Voxels, WorldPos,
 };
 use brickfield::frame::{Backend, Evaluate, Frame, FramePlan, Join, ShaderFunction, Upload};
 use brickfield::lod::Criterion;
@@ -86,7 +86,10 @@ fn waves(p: DVec3, dims: DVec3) -> f64 {
 }
 
 /// A volume whose bricks at the upper ends reach beyond it.
-fn volume<T: Scalar>(sample: impl Fn(f64) -> T) -> Volume {
+fn volume<T>(sample: impl Fn(f64) -> T) -> Volume
+where
+    Voxels: From<Vec<T>>,
+{
     let dims = UVec3::new(41, 37, 50);
     let grid = Grid::axis_aligned(dims, DVec3::ONE).unwrap();
     let voxel = |i: u32| {
