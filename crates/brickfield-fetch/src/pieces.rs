@@ -68,7 +68,7 @@ impl Pieces {
         if let Some(gap) = self.gaps(range).into_iter().next() {
             return Err(gap);
         }
-        let mut bytes = Vec::with_capacity((range.end - range.start) as usize);
+        let mut bytes = Vec::with_capacity(range.end.saturating_sub(range.start) as usize);
         self.within(range).for_each(|part| bytes.extend_from_slice(part.bytes));
         Ok(bytes)
     }
