@@ -68,7 +68,9 @@ impl Pieces {
         if let Some(gap) = self.gaps(range).into_iter().next() {
             return Err(gap);
         }
-        Ok(self.within(range).flat_map(|part| part.bytes.iter().copied()).collect())
+        let mut bytes = Vec::with_capacity(range.end.saturating_sub(range.start) as usize);
+        self.within(range).for_each(|part| bytes.extend_from_slice(part.bytes));
+        Ok(bytes)
     }
 
     /// Bytes of the piece that begins at an offset; `None` if there is none.

@@ -18,7 +18,7 @@ pub(crate) enum Reach {
     Network,
 }
 
-/// The "status" of a file system: what it says once, it says again.
+/// The "status" of a file system.
 const OF_FOLDER: u16 = 1;
 
 /// What another attempt would find.
@@ -30,8 +30,12 @@ pub(crate) enum Answer {
     Whole { n_bytes: u64 },
     /// An answer with a part, which may have been a wrong one.
     Part,
+    /// That there is no such object.
+    Absent,
     /// The same again.
     Final,
+    /// The same again, by a file system: no status tells why.
+    Folder,
 }
 
 impl Seen {
@@ -55,6 +59,8 @@ impl Seen {
             0 | 408 | 429 | 500.. => Answer::Trouble,
             200 => Answer::Whole { n_bytes: self.n_bytes.load(Ordering::Relaxed) },
             206 => Answer::Part,
+            404 => Answer::Absent,
+            OF_FOLDER => Answer::Folder,
             _ => Answer::Final,
         }
     }
@@ -72,9 +78,9 @@ mod tests {
             seen.answer()
         };
         assert!([408, 429, 500, 503, 599].iter().all(|&s| answer(s) == Answer::Trouble));
-        assert!([301, 400, 403, 404, 410, 416, 431].iter().all(|&s| answer(s) == Answer::Final));
+        assert!([301, 400, 403, 405, 410, 416, 431].iter().all(|&s| answer(s) == Answer::Final));
         assert_eq!((answer(206), Seen::default().answer()), (Answer::Part, Answer::Trouble));
-        assert_eq!(Seen::of(Reach::Folder).answer(), Answer::Final);
+        assert_eq!((Seen::of(Reach::Folder).answer(), answer(404)), (Answer::Folder, Answer::Absent));
         assert_eq!(answer(200), Answer::Whole { n_bytes: u64::MAX });
     }
 }

@@ -309,10 +309,10 @@ fn refused(asked: &Asked, fault: String) -> Fault {
 fn fault(error: Error, seen: &Seen, asked: &Asked) -> Fault {
     let told = one_line(&error);
     match (&error, seen.answer()) {
-        (Error::NotFound { .. }, _) => Fault::Absent,
-        (Error::PermissionDenied { .. } | Error::Unauthenticated { .. }, _) | (_, Answer::Final) => {
-            refused(asked, told)
-        }
+        // `object_store` takes status 405 for it, too.
+        (_, Answer::Absent) | (Error::NotFound { .. }, Answer::Folder) => Fault::Absent,
+        (Error::PermissionDenied { .. } | Error::Unauthenticated { .. }, _) => refused(asked, told),
+        (_, Answer::Final | Answer::Folder) => refused(asked, told),
         _ => Fault::Again(told),
     }
 }

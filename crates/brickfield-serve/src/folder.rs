@@ -50,6 +50,14 @@ fn is_served_name(name: &OsStr) -> bool {
     !name.as_encoded_bytes().starts_with(b".") || zarr.iter().any(|z| name == *z)
 }
 
+/// A file that may not be read is there: `ServeDir` would answer 404, and a viewer would draw a hole.
+fn not_absent(error: io::Error) -> io::Error {
+    match error.kind() {
+        io::ErrorKind::PermissionDenied => io::Error::other(error),
+        _ => error,
+    }
+}
+
 type Later<T> = Pin<Box<dyn Future<Output = io::Result<T>> + Send>>;
 
 impl Backend for Inside {
@@ -61,20 +69,28 @@ impl Backend for Inside {
     fn open(&self, path: PathBuf) -> Later<TokioFile> {
         let inside = self.clone();
         Box::pin(async move {
-            let file = tokio::task::spawn_blocking(move || inside.resolve(&path)).await??;
-            TokioBackend.open(file).await
+            let file = tokio::task::spawn_blocking(move || inside.resolve(&path)).await?.map_err(not_absent)?;
+            TokioBackend.open(file).await.map_err(not_absent)
         })
     }
 
     fn metadata(&self, path: PathBuf) -> Later<Metadata> {
         let inside = self.clone();
-        Box::pin(async move { tokio::task::spawn_blocking(move || inside.resolve(&path)?.metadata()).await? })
+        let metadata = move || inside.resolve(&path).and_then(|file| file.metadata()).map_err(not_absent);
+        Box::pin(async move { tokio::task::spawn_blocking(metadata).await? })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_may_not_be_read_is_not_told_to_be_absent() {
+        let kinds =
+            [io::ErrorKind::PermissionDenied, io::ErrorKind::NotFound].map(|kind| not_absent(kind.into()).kind());
+        assert_eq!(kinds, [io::ErrorKind::Other, io::ErrorKind::NotFound]);
+    }
 
     #[test]
     fn names_with_a_dot_are_not_served_unless_zarr_has_them() {

@@ -72,11 +72,13 @@ fn links_lead_to_what_is_served_anyway() {
     link("c/0", "inside");
     link("c", "folder");
     link("c/0", ".dot");
+    // Opening a pipe would wait for somebody at its other end, and a socket cannot be opened.
+    let _socket = std::os::unix::net::UnixListener::bind(folder.join("socket")).unwrap();
     // The folder itself may be reached by a link.
     let entry = outer.path().join("entry");
     symlink(&folder, &entry).unwrap();
     let server = Server::start(&entry, ServeOptions::default()).unwrap();
-    for path in [
+    let absent = [
         "file",
         "up/secret",
         "up/store/c/0/..",
@@ -85,17 +87,15 @@ fn links_lead_to_what_is_served_anyway() {
         "shown",
         "endless",
         "broken",
-        "circle",
         ".dot",
-    ] {
+        "socket",
+    ];
+    for path in absent {
         let answer = get(&server, &format!("/{path}"));
-        assert_eq!(
-            (answer.status, answer.body.len()),
-            (if path == "circle" { answer.status } else { 404 }, 0),
-            "{path}"
-        );
-        assert!(answer.status >= 400, "{path}");
+        assert_eq!((answer.status, answer.body.len()), (404, 0), "{path}");
     }
+    let circle = get(&server, "/circle");
+    assert!([404, 500].contains(&circle.status) && circle.body.is_empty(), "{}", circle.status);
     for path in ["inside", "folder/0", "c/0"] {
         assert_eq!(get(&server, &format!("/{path}")).status, 200, "{path}");
     }
