@@ -69,3 +69,18 @@ impl SaladiArgs {
         all.filter(|part| self.part.is_empty() || self.part.contains(part)).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_come_once_in_their_order() {
+        let parse = |words: &str| SaladiArgs::try_parse_from(words.split_whitespace());
+        let of_the_paper = parse("compare --paper saladi").unwrap();
+        assert_eq!((of_the_paper.parts().len(), of_the_paper.threshold), (Part::value_variants().len(), 30));
+        let some = parse("compare --paper saladi --part tables,normals,tables --blocks 8").unwrap();
+        assert_eq!((some.parts(), some.blocks), (vec![Part::Normals, Part::Tables], BlockSide::V8));
+        assert!(parse("compare --paper saladi --threshold 0").is_err());
+    }
+}

@@ -7,7 +7,8 @@
 //! ```
 //!
 //! Departures from the paper: slices are samples along the volume's longest axis at a level of 2^l averages, in place of every n-th slice
-//! of the file; blocks, with all levels, are built once. The shade is computed while a frame is rendered, not before.
+//! of the file; blocks, with all levels, are built once. Normals are those of the voxels at full resolution, averaged: processing with light
+//! does not fall with the slices. The shade is computed while a frame is rendered, not before: the light may move.
 
 use std::time::Instant;
 
