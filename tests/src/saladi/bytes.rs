@@ -14,7 +14,7 @@ use brickfield::bricks::{BlockOptions, BlockSource, build_blocks};
 use brickfield::delivery::{Delivery, DeliveryPlan};
 use brickfield::fetch::{Client, FetchOptions};
 use brickfield::frame::Backend;
-use brickfield::io::{OpenOptions, open};
+use brickfield::io::OpenOptions;
 use brickfield::lod::BlockLevels;
 use brickfield::optics::automatic;
 use brickfield::{BlockResidency, Codec, Scene, StoreBlocks, StoreLimits, Viewpoint, prepare_blocks};
@@ -24,7 +24,7 @@ use serde::Serialize;
 use super::SaladiArgs;
 use super::data::style;
 use super::plot::{Curve, plot};
-use super::stores::{files, store};
+use super::stores::{files, store, volume_of};
 use crate::codecs::peers::{PeerSlices, peer_slices};
 use crate::compare::rivals::Rivals;
 use crate::metrics::{delta_e, errors};
@@ -64,7 +64,7 @@ pub(super) fn run(args: &SaladiArgs, rivals: &mut Rivals) -> Result<Vec<Missed>,
     let (mut rows, mut missed) = (Vec::new(), Vec::new());
     for (name, path) in files(args)? {
         let stores = [store(args, &name, &path, Codec::Haar)?, store(args, &name, &path, Codec::Zstd)?];
-        let opened = open(&path, &OpenOptions::default())?;
+        let opened = volume_of(&path)?;
         let volume = Arc::new(opened.volume);
         let camera = Viewpoint::default().camera(volume.grid(), opened.frame, args.common.size)?;
         let scene = Scene { step_voxels: args.common.step, ..Scene::new(camera, args.common.size, automatic(&volume)) };

@@ -5,11 +5,9 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use brickfield::bricks::BlockSource;
 use brickfield::delivery::{Delivery, DeliveryError};
 use brickfield::fetch::{Client, FetchOptions};
 use brickfield::frame::Backend;
-use brickfield::io::{OpenOptions, open};
 use brickfield::optics::automatic;
 use brickfield::serve::{Faults, ServeOptions, Server, Throttle};
 use brickfield::{BlockResidency, Codec, Scene, StoreLimits, Viewpoint, prepare_blocks};
@@ -18,7 +16,7 @@ use serde::Serialize;
 
 use super::SaladiArgs;
 use super::data::style;
-use super::stores::{files, store};
+use super::stores::{files, store, volume_of};
 use crate::compare::rivals::Rivals;
 use crate::metrics::greatest_difference;
 use crate::paper::{Missed, PaperError, frame_of, print};
@@ -58,7 +56,7 @@ pub(super) fn run(args: &SaladiArgs, rivals: &mut Rivals) -> Result<Vec<Missed>,
     )?;
     let (mut rows, mut missed) = (Vec::new(), Vec::new());
     for (name, path) in files(args)? {
-        let opened = open(&path, &OpenOptions::default())?;
+        let opened = volume_of(&path)?;
         let camera = Viewpoint::default().camera(opened.volume.grid(), opened.frame, args.common.size)?;
         let scene =
             Scene { step_voxels: args.common.step, ..Scene::new(camera, args.common.size, automatic(&opened.volume)) };

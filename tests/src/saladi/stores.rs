@@ -2,9 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use brickfield::bricks::BlockSource;
 use brickfield::io::ome_zarr::ZarrLevels;
-use brickfield::io::{OpenOptions, open, open_slices};
+use brickfield::io::{Limits, OpenOptions, Opened, open, open_slices};
 use brickfield::{Codec, StoreLimits, pack};
 use brickfield_core::glam::UVec3;
 use brickfield_core::{Rescale, Voxels};
@@ -32,6 +31,11 @@ pub(super) fn files(args: &SaladiArgs) -> Result<Vec<(String, PathBuf)>, PaperEr
     args.common.named(&DATA)
 }
 
+/// A volume as `pack` reads it: uneven slices are made even.
+pub(super) fn volume_of(path: &Path) -> Result<Opened, PaperError> {
+    Ok(open(path, &OpenOptions::default())?.evenly_spaced(&Limits::default()))
+}
+
 /// A store of a volume in the output folder, packed now.
 pub(super) fn store(args: &SaladiArgs, name: &str, path: &Path, codec: Codec) -> Result<PathBuf, PaperError> {
     let plain: String = name.chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();
@@ -51,7 +55,7 @@ pub(super) fn run(args: &SaladiArgs) -> Result<Vec<Missed>, PaperError> {
     let (mut rows, mut missed) = (Vec::new(), Vec::new());
     for (name, path) in files(args)? {
         let stores = [store(args, &name, &path, Codec::Zstd)?, store(args, &name, &path, Codec::Haar)?];
-        let volume = open(&path, &OpenOptions::default())?.volume;
+        let volume = volume_of(&path)?.volume;
         let n_voxel_bytes = (volume.voxels().len() * volume.scalar_type().n_bytes()) as u64;
         let mut n_bytes = [0; 2];
         let mut of_level_0 = [0; 2];

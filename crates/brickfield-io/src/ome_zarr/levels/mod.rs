@@ -115,7 +115,9 @@ impl ZarrLevels {
             let what = || format!("a chunk of shape {:?}", level.parts.part_shape);
             check_bytes(level.parts.n_bytes(), &options.limits, what)?;
         }
-        let group = image.path.rsplit_once('/').map_or("", |(group, _)| group).to_owned();
+        // Details lie in a group of their own.
+        let coarsest = images.last().map_or("", |(image, _)| image.path.as_str());
+        let group = coarsest.rsplit_once('/').map_or("", |(group, _)| group).to_owned();
         Ok(ZarrLevels {
             facts: found.described(grid, shape.scalar, image.rescale)?,
             levels,

@@ -14,6 +14,8 @@ use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+#[cfg(feature = "fetch")]
+use brickfield::core::Aabb;
 use brickfield::io::SAVED_EXTENSIONS;
 use brickfield::options::{
     BlockArgs, Boxes, InputOptions, LightOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions, values,
