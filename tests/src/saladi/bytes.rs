@@ -32,6 +32,10 @@ use crate::paper::{Missed, PaperError, frame_of, print};
 
 const SIDE: BlockSide = BlockSide::V32;
 
+const HAAR: &str = "view, haar";
+const ZSTD: &str = "view, zstd";
+const PYRAMID: &str = "pyramid, zstd";
+
 /// What a prefix shows.
 #[derive(Clone, Debug, Serialize)]
 struct BytesRow {
@@ -103,9 +107,9 @@ fn run_target(
     slices: Option<&PeerSlices>,
 ) -> Result<Vec<BytesRow>, PaperError> {
     let by_view = |plan: DeliveryPlan| plan;
-    let mut rows = delivered(backend, target, "view, haar", haar, by_view)?;
-    rows.extend(delivered(backend, target, "view, zstd", zstd, by_view)?);
-    rows.extend(delivered(backend, target, "pyramid, zstd", zstd, DeliveryPlan::level_by_level)?);
+    let mut rows = delivered(backend, target, HAAR, haar, by_view)?;
+    rows.extend(delivered(backend, target, ZSTD, zstd, by_view)?);
+    rows.extend(delivered(backend, target, PYRAMID, zstd, DeliveryPlan::level_by_level)?);
     match slices {
         Some(slices) => rows.extend(in_slices(backend, target, volume, slices)?),
         None => print("slices: absent: no Python with imagecodecs (BRICKFIELD_PYTHON names one)")?,
@@ -240,21 +244,17 @@ fn print_rows(rows: &[BytesRow]) -> Result<(), PaperError> {
     })
 }
 
-/// The error at which orders are compared, as a part of the first picture's.
+/// The error at which orders are compared, as a part of the pyramid's first one.
 const PART: f64 = 0.25;
 
-/// All bytes give the picture of all voxels, and the order of the view comes near it earlier than the pyramid does.
+/// All bytes give the picture of all voxels, and of a region the order of the view comes near it earlier than the pyramid does.
 fn claims(target: &Target, rows: &[BytesRow]) -> Result<Vec<Missed>, PaperError> {
+    let of_order = |order: &str| rows.iter().filter(|row| row.order == order).collect::<Vec<_>>();
     let mut missed = Vec::new();
-    let mut needed = Vec::new();
-    for order in ["view, haar", "view, zstd", "pyramid, zstd"] {
-        let of_order: Vec<&BytesRow> = rows.iter().filter(|row| row.order == order).collect();
-        let (Some(first), Some(last)) = (of_order.first(), of_order.last()) else { continue };
-        let bound = PART * first.rmse;
-        needed.push(of_order.iter().find(|row| row.rmse <= bound).map_or(u64::MAX, |row| row.n_bytes));
+    for order in [HAAR, ZSTD, PYRAMID] {
         // A store by zstd may have values of another type.
-        let most = if order.ends_with("haar") { 0.0 } else { 1e-5 };
-        if last.rmse > most {
+        let most = if order == HAAR { 0.0 } else { 1e-6 };
+        if let Some(last) = of_order(order).last().filter(|last| last.rmse > most) {
             let what = format!(
                 "{}, {}: {order}: RMSE {:.1e} of all bytes, at most {most:.0e}",
                 target.data, target.subject, last.rmse
@@ -262,18 +262,28 @@ fn claims(target: &Target, rows: &[BytesRow]) -> Result<Vec<Missed>, PaperError>
             missed.push(Missed::of_pictures(what));
         }
     }
-    if let [haar, _, pyramid] = needed[..] {
-        let what = format!(
-            "{}, {}: {PART} of the first error after {:.0} KiB by the view (haar), {:.0} KiB by the pyramid",
-            target.data,
-            target.subject,
-            haar as f64 / 1024.0,
-            pyramid as f64 / 1024.0
-        );
-        print(&what)?;
-        missed.extend((haar > pyramid).then(|| Missed::of_pictures(what)));
-    }
+    let bound = of_order(PYRAMID).first().map_or(0.0, |first| PART * first.rmse);
+    let [by_view, by_pyramid] = [HAAR, PYRAMID].map(|order| needed_bytes(&of_order(order), bound));
+    let what = format!(
+        "{}, {}: RMSE {bound:.1e} after {:.0} KiB by the view (haar), {:.0} KiB by the pyramid",
+        target.data,
+        target.subject,
+        by_view / 1024.0,
+        by_pyramid / 1024.0
+    );
+    print(&what)?;
+    missed.extend((target.region.is_some() && by_view > by_pyramid).then(|| Missed::of_pictures(what)));
     Ok(missed)
+}
+
+/// The bytes at which a curve falls to an error, straight between its points in logarithms of both; infinite if it does not.
+fn needed_bytes(rows: &[&BytesRow], bound: f64) -> f64 {
+    let Some(i) = rows.iter().position(|row| row.rmse <= bound) else { return f64::INFINITY };
+    let (at, n_bytes) = (&rows[i], |row: &BytesRow| row.n_bytes as f64);
+    let Some(before) = i.checked_sub(1).map(|i| rows[i]) else { return n_bytes(at) };
+    let log = |rmse: f64| rmse.max(f64::MIN_POSITIVE).ln();
+    let part = (log(before.rmse) - log(bound)) / (log(before.rmse) - log(at.rmse));
+    n_bytes(before) * (n_bytes(at) / n_bytes(before)).powf(part)
 }
 
 fn draw(args: &SaladiArgs, target: &Target, rows: &[BytesRow]) -> Result<(), PaperError> {

@@ -298,6 +298,8 @@ fn whole(arrived: &Arrived, key: &str) -> Result<Vec<u8>, DeliveryError> {
     parts.into_iter().flatten().next().ok_or_else(missing)
 }
 
+/// Requests of ranges that are not empty.
 fn requests(ranges: Vec<ObjectRange>) -> Vec<Request> {
-    ranges.into_iter().map(|ObjectRange { key, range }| Request { key, range }).collect()
+    let ranges = ranges.into_iter().filter(|r| r.range.as_ref().is_none_or(|range| !range.is_empty()));
+    ranges.map(|ObjectRange { key, range }| Request { key, range }).collect()
 }

@@ -201,25 +201,23 @@ impl Parts {
         Ok(Some((offset, n_bytes)))
     }
 
-    /// Where a part lies; `None` if it is not stored.
-    pub(super) fn stored_place(
-        &self,
-        part: &[u64],
-        index: Option<&ShardIndex>,
-    ) -> Result<Option<StoredPlace>, ReadError> {
+    /// Where a part lies; an empty range if it is not stored.
+    pub(super) fn stored_place(&self, part: &[u64], index: Option<&ShardIndex>) -> Result<StoredPlace, ReadError> {
         let chunk_key = self.chunks.chunk_key(&self.chunk_of(part));
         let key = chunk_key.as_str().to_owned();
-        match (&self.packing, index) {
+        let place = match (&self.packing, index) {
             (Packing::Plain(_), _) => {
                 let n_bytes = self.store.size_key(&chunk_key).map_err(|e| ReadError::decoder(self.named(part), e))?;
-                Ok(n_bytes.map(|n_bytes| StoredPlace { key, range: None, n_bytes }))
+                return Ok(match n_bytes {
+                    Some(n_bytes) => StoredPlace { key, range: None, n_bytes },
+                    None => StoredPlace { key, range: Some(0..0), n_bytes: 0 },
+                });
             }
-            (Packing::Shard(_), None) => Ok(None),
-            (Packing::Shard(_), Some(index)) => {
-                let place = self.place_in(index, part)?;
-                Ok(place.map(|(offset, n_bytes)| StoredPlace { key, range: Some(offset..offset + n_bytes), n_bytes }))
-            }
-        }
+            (Packing::Shard(_), None) => None,
+            (Packing::Shard(_), Some(index)) => self.place_in(index, part)?,
+        };
+        let (offset, n_bytes) = place.unwrap_or((0, 0));
+        Ok(StoredPlace { key, range: Some(offset..offset + n_bytes), n_bytes })
     }
 
     /// The bytes of a shard that are its index; `None`, for all of it, if the index is at its end.

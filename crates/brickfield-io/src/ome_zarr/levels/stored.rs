@@ -115,7 +115,8 @@ impl ZarrLevels {
             .collect())
     }
 
-    /// The chunks of a level that are stored, z slowest. Indices of shards are read, and lengths of chunks that are objects of their own.
+    /// The chunks of a level, z slowest; of one that holds nothing but the fill value there are no bytes. Indices of shards are read, and
+    /// lengths of chunks that are objects of their own.
     ///
     /// # Errors
     /// Indices that are damaged, or lost from a packed store.
@@ -130,8 +131,7 @@ impl ZarrLevels {
         for at in positions(n) {
             let part = array.part_at(at.as_u64vec3());
             let index = self.index_of(&array.parts, level, array.parts.chunk_of(&part))?;
-            let place = array.parts.stored_place(&part, index.as_deref())?;
-            let Some(StoredPlace { key, range, n_bytes }) = place else { continue };
+            let StoredPlace { key, range, n_bytes } = array.parts.stored_place(&part, index.as_deref())?;
             let (first, bytes) = (at * side, ObjectRange { key, range });
             chunks.push(StoredChunk { first, extent: side.min(array.dims - first), bytes, n_bytes });
         }
