@@ -17,7 +17,7 @@ mod pack;
 mod write;
 
 pub(crate) use levels::slices;
-pub use levels::{ObjectRange, ROOT_DOCUMENT, StoredChunk, ZarrLevels, stated_documents};
+pub use levels::{ObjectRange, ROOT_DOCUMENT, StatedDocuments, StoredChunk, ZarrLevels, stated_documents};
 pub use pack::{Finest, PyramidOptions, PyramidWriter};
 pub use write::save;
 

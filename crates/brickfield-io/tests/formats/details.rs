@@ -9,7 +9,7 @@ use std::{fs, io};
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Grid, Level, Objects, Rescale, Scalar, ScalarType, ValueRange, Voxels};
 use brickfield_io::ome_zarr::{
-    Finest, ObjectRange, PyramidOptions, PyramidWriter, ROOT_DOCUMENT, ZarrLevels, stated_documents,
+    Finest, ObjectRange, PyramidOptions, PyramidWriter, ROOT_DOCUMENT, StatedDocuments, ZarrLevels, stated_documents,
 };
 use brickfield_io::{Compression, OpenOptions, SaveNote, open};
 
@@ -225,12 +225,12 @@ fn the_root_document_has_those_of_all_levels() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("head.zarr");
     write::<u8>(&path, &samples(0.0, 255.0), Rescale::IDENTITY);
-    let (stated, others) = stated_documents(&fs::read(path.join(ROOT_DOCUMENT)).unwrap()).unwrap();
+    let StatedDocuments { stated, others } = stated_documents(&fs::read(path.join(ROOT_DOCUMENT)).unwrap()).unwrap();
     assert_eq!((stated.len(), &others[..]), (1, &["brickfield_details/0/zarr.json".to_owned()][..]));
     let json = |bytes: &[u8]| serde_json::from_slice::<serde_json::Value>(bytes).unwrap();
     for (key, bytes) in stated {
         assert_eq!(json(&bytes), json(&fs::read(path.join(key)).unwrap()));
     }
     assert!(stated_documents(b"{").is_err());
-    assert_eq!(stated_documents(b"{}").unwrap(), (vec![], vec![]));
+    assert_eq!(stated_documents(b"{}").unwrap(), StatedDocuments::default());
 }

@@ -269,9 +269,9 @@ mod tests {
         (layout, vec![item(0, 0, 1, 700, Some(2)), item(0, 1, 2, 700, Some(2)), item(1, 0, 2, 200, None)])
     }
 
-    fn order(errors: [LevelErrors; 2], phases: &[Vec<f32>]) -> FetchOrder {
+    fn order(errors: [LevelErrors; 2], phases: Vec<Vec<f32>>) -> FetchOrder {
         let (layout, items) = two_blocks();
-        fetch_order(&layout, &errors, phases, Level(5), &items).unwrap()
+        fetch_order(&layout, &errors, &phases, Level(5), &items).unwrap()
     }
 
     const SEEN: LevelErrors = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
@@ -280,17 +280,17 @@ mod tests {
     #[test]
     fn what_is_seen_comes_first_and_the_rest_completes_the_volume() {
         let all = vec![1.0; 2];
-        assert_eq!(order([UNSEEN, SEEN], &[all.clone()]), FetchOrder { items: vec![2, 1, 0], phase_ends: vec![2] });
-        assert_eq!(order([SEEN, UNSEEN], &[all.clone()]), FetchOrder { items: vec![2, 0, 1], phase_ends: vec![2] });
-        assert_eq!(order([UNSEEN, UNSEEN], &[all]), FetchOrder { items: vec![2, 0, 1], phase_ends: vec![0] });
+        assert_eq!(order([UNSEEN, SEEN], vec![all.clone()]), FetchOrder { items: vec![2, 1, 0], phase_ends: vec![2] });
+        assert_eq!(order([SEEN, UNSEEN], vec![all.clone()]), FetchOrder { items: vec![2, 0, 1], phase_ends: vec![2] });
+        assert_eq!(order([UNSEEN, UNSEEN], vec![all]), FetchOrder { items: vec![2, 0, 1], phase_ends: vec![0] });
     }
 
     #[test]
     fn a_region_of_interest_comes_before_what_gains_more() {
         let (much, all) = (SEEN.map(|error| 9.0 * error), vec![1.0; 2]);
-        assert_eq!(order([much, SEEN], &[all.clone()]).items, [2, 0, 1]);
+        assert_eq!(order([much, SEEN], vec![all.clone()]).items, [2, 0, 1]);
         assert_eq!(
-            order([much, SEEN], &[vec![0.0, 1.0], all]),
+            order([much, SEEN], vec![vec![0.0, 1.0], all]),
             FetchOrder { items: vec![2, 1, 0], phase_ends: vec![2, 3] }
         );
     }
@@ -299,7 +299,7 @@ mod tests {
     #[test]
     fn what_is_refined_comes_before_what_refines_it() {
         let errors = [[0.0, 5.0, 5.0, 5.0, 5.0, 5.0], UNSEEN];
-        assert_eq!(order(errors, &[vec![1.0; 2]]), FetchOrder { items: vec![2, 0, 1], phase_ends: vec![2] });
+        assert_eq!(order(errors, vec![vec![1.0; 2]]), FetchOrder { items: vec![2, 0, 1], phase_ends: vec![2] });
     }
 
     #[test]

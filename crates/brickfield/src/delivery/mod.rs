@@ -19,7 +19,7 @@ use brickfield_bricks::BlockSource;
 use brickfield_core::glam::UVec3;
 use brickfield_core::{Aabb, BlockSide, Level, Objects, Volume};
 use brickfield_fetch::{Arrived, ArrivedError, Client, FetchError, Request};
-use brickfield_io::ome_zarr::{ObjectRange, ROOT_DOCUMENT, ZarrLevels, stated_documents};
+use brickfield_io::ome_zarr::{ObjectRange, ROOT_DOCUMENT, StatedDocuments, ZarrLevels, stated_documents};
 use brickfield_io::{Limits, OpenError, OpenOptions, ReadError};
 use brickfield_lod::{
     BlockErrors, BlockView, EstimateError, FetchItem, FetchOrder, FetchOrderError, Importance, Slab, block_weights,
@@ -101,7 +101,7 @@ impl Delivery {
     pub fn begin(location: &str, client: Client, limits: StoreLimits) -> Result<Delivery, DeliveryError> {
         let arrived = Arc::new(Arrived::default());
         client.deliver(&[Request::whole(ROOT_DOCUMENT)], &arrived)?;
-        let (stated, others) = stated_documents(&whole(&arrived, ROOT_DOCUMENT)?)?;
+        let StatedDocuments { stated, others } = stated_documents(&whole(&arrived, ROOT_DOCUMENT)?)?;
         for (key, bytes) in &stated {
             arrived.insert_whole(key, bytes)?;
         }
@@ -294,7 +294,8 @@ fn whole(arrived: &Arrived, key: &str) -> Result<Vec<u8>, DeliveryError> {
     let fault = |source| DeliveryError::Document { key: key.to_owned(), source };
     let n_bytes = arrived.n_bytes(key).map_err(fault)?;
     let missing = || DeliveryError::NoDocument { key: key.to_owned() };
-    let parts = arrived.read(key, &[0..n_bytes.ok_or_else(missing)?]).map_err(fault)?;
+    let all = 0..n_bytes.ok_or_else(missing)?;
+    let parts = arrived.read(key, std::slice::from_ref(&all)).map_err(fault)?;
     parts.into_iter().flatten().next().ok_or_else(missing)
 }
 

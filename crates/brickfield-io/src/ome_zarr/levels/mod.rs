@@ -7,7 +7,7 @@ mod stored;
 
 pub(super) use slices::read_details;
 pub(crate) use slices::slices;
-pub use stored::{ObjectRange, ROOT_DOCUMENT, StoredChunk, stated_documents};
+pub use stored::{ObjectRange, ROOT_DOCUMENT, StatedDocuments, StoredChunk, stated_documents};
 
 use std::path::Path;
 use std::sync::Arc;

@@ -43,21 +43,29 @@ pub struct StoredChunk {
 /// The document by which a store is opened.
 pub const ROOT_DOCUMENT: &str = "zarr.json";
 
-/// The other documents that a store of [`PyramidWriter`](super::super::PyramidWriter) states in its root document: their keys and bytes.
-/// And the keys of those that it does not state.
+/// The other documents of a store, as its root document has them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct StatedDocuments {
+    /// Keys and bytes of those that it states.
+    pub stated: Vec<(String, Vec<u8>)>,
+    /// Keys of those that must be read.
+    pub others: Vec<String>,
+}
+
+/// The other documents of a store of [`PyramidWriter`](super::super::PyramidWriter), from the bytes of its root document.
 ///
 /// # Errors
 /// If the bytes are no JSON.
-pub fn stated_documents(root: &[u8]) -> Result<(Vec<(String, Vec<u8>)>, Vec<String>), ReadError> {
+pub fn stated_documents(root: &[u8]) -> Result<StatedDocuments, ReadError> {
     let root: serde_json::Value = serde_json::from_slice(root).map_err(|e| ReadError::decoder(ROOT_DOCUMENT, e))?;
     let stated = root["consolidated_metadata"]["metadata"].as_object();
     let document = |(path, json): (&String, &serde_json::Value)| {
         let bytes = serde_json::to_vec(json).map_err(|e| ReadError::decoder(ROOT_DOCUMENT, e))?;
         Ok((joined(path, ROOT_DOCUMENT), bytes))
     };
-    let stated: Result<Vec<_>, ReadError> = stated.into_iter().flatten().map(document).collect();
+    let stated = stated.into_iter().flatten().map(document).collect::<Result<_, ReadError>>()?;
     let details = root["attributes"][DETAILS_KEY]["path"].as_str();
-    Ok((stated?, details.map(|path| joined(path, ROOT_DOCUMENT)).into_iter().collect()))
+    Ok(StatedDocuments { stated, others: details.map(|path| joined(path, ROOT_DOCUMENT)).into_iter().collect() })
 }
 
 impl ZarrLevels {
