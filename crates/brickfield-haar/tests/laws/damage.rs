@@ -38,14 +38,14 @@ fn forged_bricks_keep_to_their_extent<T: Sample>() {
         }
         sign(&mut forged, &BrickHeader::read(&brick).expect("a header"));
         let n_stated = BrickHeader::read(&forged).map(|header| header.extent().as_u64vec3().element_product());
-        if n_stated.is_ok_and(|n| n > 1 << 20) {
+        if n_stated.as_ref().is_ok_and(|n| *n > 1 << 20) {
             return Ok(());
         }
         if let Ok(packed) = PackedBrick::read(&forged) {
             let n_numbers: usize = packed.sections().iter().map(|section| section.n_numbers).sum();
             prop_assert_eq!(Ok(n_numbers as u64), n_stated);
-            let is_broken = matches!(decode::<T>(&forged), Err(DecodeError::Section { .. }));
-            prop_assert!(!is_broken);
+            let has_broken_section = matches!(decode::<T>(&forged), Err(DecodeError::Section { .. }));
+            prop_assert!(!has_broken_section);
         }
         for level in [Level(0), Level(level)] {
             if let Ok(decoded) = decode_level::<T>(&forged, level) {
@@ -60,7 +60,7 @@ for_all_types!(forged_bricks_keep_to_their_extent);
 /// Packed bricks open, and no others; a width beyond a coefficient's bits and groups that are too few do not.
 #[test]
 fn packed_bricks_open_if_their_groups_are_whole() {
-    let samples: Vec<u8> = (0..343).map(|i| (i * i % 251) as u8).collect();
+    let samples: Vec<u8> = (0..343).map(|i| (i % 7 * 9 + i / 49) as u8).collect();
     let kernels = vec![Kernel::Haar];
     let of = |storages| EncodeOptions { storages, kernels: kernels.clone(), ..EncodeOptions::default() };
     let packed = encode(UVec3::splat(7), &samples, &of(Storages::Packed)).unwrap();
