@@ -122,6 +122,11 @@ fn steps() -> Result<Vec<Step>> {
     let rows = ["--part", "normals", "--only", "engine", "--size", "64x64", "--frames", "1"];
     let normals = [&of_saladi[..], &rows].concat();
     steps.push(step_with_data("normals of surface voxels", move || checked("compare", &normals).run()));
+    let rows = ["--part", "stores,bytes,served", "--only", "LIDC2", "--size", "64x64"];
+    let delivery = [&of_saladi[..], &rows].concat();
+    steps.push(step_with_data("stores that arrive bit by bit", move || checked("compare", &delivery).run()));
+    let rows = ["--codecs", "--part", "upload", "--only", "tooth", "--frames", "1", "--require", "wgpu,ash"];
+    steps.push(step_with_data("packed uploads", move || checked("compare", &rows).run()));
     Ok(steps)
 }
 

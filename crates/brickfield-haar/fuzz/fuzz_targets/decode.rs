@@ -1,7 +1,7 @@
 #![no_main]
 
 use brickfield_core::{Level, ScalarType};
-use brickfield_haar::{BrickHeader, Sample, decode, decode_level, decode_with_low};
+use brickfield_haar::{BrickHeader, PackedBrick, Sample, decode, decode_level, decode_with_low};
 use libfuzzer_sys::fuzz_target;
 
 /// Bricks of more samples are not decoded: a few bytes may state 2^28 of them.
@@ -11,6 +11,10 @@ fuzz_target!(|bytes: &[u8]| {
     let Ok(header) = BrickHeader::read(bytes) else { return };
     if header.extent().as_u64vec3().element_product() > MAX_SAMPLES {
         return;
+    }
+    if let Ok(packed) = PackedBrick::read(bytes) {
+        let n_numbers: usize = packed.sections().iter().map(|section| section.n_numbers).sum();
+        assert_eq!(n_numbers as u64, header.extent().as_u64vec3().element_product());
     }
     match header.scalar() {
         ScalarType::U8 => all_levels::<u8>(bytes, &header),

@@ -1,7 +1,9 @@
 #![no_main]
 
 use brickfield_core::glam::UVec3;
-use brickfield_haar::{BrickHeader, EncodeOptions, Kernel, Loss, Sample, Storages, decode, encode};
+use brickfield_haar::{
+    BrickHeader, EncodeOptions, Kernel, Loss, LowBand, Sample, Storages, decode, decode_with_low, encode,
+};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
@@ -32,6 +34,9 @@ fn round_trip<T: Sample, const N: usize>(content: &[u8], [options, x, y, loss]: 
     };
     let storages = if options & 8 == 0 { Storages::Smallest } else { Storages::Packed };
     let n_levels = if options & 16 == 0 { None } else { Some(options >> 5) };
+    if loss == u8::MAX {
+        return without_low_band(extent, samples, storages);
+    }
     let max_error = u32::from(loss);
     let loss = if loss == 0 { Loss::None } else { Loss::MaxError(max_error) };
     let brick =
@@ -41,4 +46,21 @@ fn round_trip<T: Sample, const N: usize>(content: &[u8], [options, x, y, loss]: 
     let error = samples.iter().zip(&decoded.samples).map(|(a, b)| a.to_i64().abs_diff(b.to_i64())).max();
     assert_eq!(error, Some(u64::from(BrickHeader::read(&brick).expect("a header").max_error())));
     assert!(error <= Some(u64::from(max_error)) && decoded.extent == extent);
+}
+
+/// Details and the means that are level 1 make the samples.
+fn without_low_band<T: Sample>(extent: UVec3, samples: &[T], storages: Storages) {
+    let kernels = vec![Kernel::Haar, Kernel::HaarPredicted];
+    let options = EncodeOptions { kernels, storages, low_band: LowBand::Elsewhere, ..EncodeOptions::default() };
+    let brick = encode(extent, samples, &options).expect("a brick");
+    let n = (extent + 1) / 2;
+    let mut sums = vec![(0i64, 0i64); n.element_product() as usize];
+    for (i, sample) in (0..).zip(samples) {
+        let cell = UVec3::new(i % extent.x, i / extent.x % extent.y, i / extent.x / extent.y) / 2;
+        let sum = &mut sums[(cell.x + n.x * (cell.y + n.y * cell.z)) as usize];
+        *sum = (sum.0 + sample.to_i64(), sum.1 + 1);
+    }
+    let low: Vec<T> = sums.into_iter().map(|(sum, n)| T::saturate((2 * sum + n).div_euclid(2 * n))).collect();
+    let decoded = decode_with_low::<T>(&brick, &low).expect("a brick that was just encoded");
+    assert!(decoded.extent == extent && decoded.samples == samples);
 }
