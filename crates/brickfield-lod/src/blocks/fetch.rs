@@ -330,6 +330,7 @@ mod tests {
         assert!(fault(&items, &[SEEN; 2], fits.clone()).contains("item 0 refines item 2"));
         items[2].level = Level(6);
         assert!(fault(&items[2..], &[SEEN; 2], fits.clone()).contains("item 0 of level 6; blocks have levels 0 to 5"));
+        items[2].level = Level(1);
         items[1].end_block.x = 3;
         assert!(fault(&items, &[SEEN; 2], fits).contains("item 1 has blocks"));
     }
