@@ -14,8 +14,8 @@ use brickfield::io::{OpenOptions, SaveOptions, open_slices, save};
 use brickfield::{Codec, Scene, StoreLimits, pack};
 
 const DIMS: UVec3 = UVec3::new(130, 97, 70);
-/// No chunk takes more bytes.
-const ANY_CHUNK: u64 = 40_000;
+/// No chunk takes more bytes: 32^3 values of four, which do not get smaller.
+const ANY_CHUNK: u64 = 140_000;
 
 /// A soft ball in the upper half along x, over nothing.
 fn volume() -> Volume {
@@ -99,7 +99,7 @@ fn every_prefix_has_blocks_of_the_volume() {
         n_steps += 1;
     }
     assert_eq!((plan.n_fetched(), plan.n_bytes_left()), (plan.n_items(), 0));
-    assert!(last.iter().all(|level| *level == Level(0)) && n_steps > 3);
+    assert!(last.iter().all(|level| *level == Level(0)) && n_steps > 1);
     check(&delivery, &expected);
 }
 
