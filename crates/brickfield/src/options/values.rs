@@ -10,7 +10,9 @@ use brickfield_lod::Criterion;
 use brickfield_optics::{LightSource, LitSides, Normals, QuadratureRule};
 
 use super::{Background, Boxes};
-use crate::{Classification, Codec, MAX_IMAGE, Quality, TransparentBlocks};
+#[cfg(feature = "formats")]
+use crate::Codec;
+use crate::{Classification, MAX_IMAGE, Quality, TransparentBlocks};
 
 /// Pixels along a facet of tessellated shells where none are asked for.
 pub const FACET_PIXELS: u32 = 16;
@@ -100,6 +102,7 @@ pub fn normals(text: &str) -> Result<Normals, String> {
 }
 
 /// How the samples of a store are coded.
+#[cfg(feature = "formats")]
 pub fn codec(text: &str) -> Result<Codec, String> {
     named(&Codec::ALL.map(|codec| (codec.name(), codec)), text)
 }

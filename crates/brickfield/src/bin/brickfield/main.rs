@@ -14,6 +14,8 @@ use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+#[cfg(feature = "formats")]
+use brickfield::Codec;
 #[cfg(feature = "fetch")]
 use brickfield::core::Aabb;
 use brickfield::io::SAVED_EXTENSIONS;
@@ -21,7 +23,7 @@ use brickfield::options::{
     BlockArgs, Boxes, InputOptions, LightOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions, values,
 };
 use brickfield::overlay::LEVEL_COLORS;
-use brickfield::{AdapterInfo, BackendError, BackendKind, BackendStatus, Codec, Trimming, Validation, backends};
+use brickfield::{AdapterInfo, BackendError, BackendKind, BackendStatus, Trimming, Validation, backends};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
 
