@@ -1,6 +1,8 @@
 //! Frames in batches show the picture of one batch, bit by bit, on every backend; and shaders that forget what batches owe each other are
 //! noticed. Prints `no device` where there is none.
 
+mod devices;
+
 use std::sync::Arc;
 
 use brickfield::core::glam::{DVec3, UVec2, UVec3};
@@ -11,9 +13,8 @@ use brickfield::{
     CacheCounts, CacheOptions, Scene, Technique, TrimCache, TrimResidency, TrimmedVolume, Trimming, prepare_trimmed,
     prepare_trimmed_batches, render_ahead,
 };
-use brickfield_ash::{AshBackend, ConnectError, Options};
+use brickfield_ash::Options;
 use brickfield_shaders::ShaderLibrary;
-use brickfield_wgpu::{AdapterChoice, OpenError, WgpuBackend};
 
 /// Balls of different values in noise.
 fn source() -> TrimmedVolume {
@@ -94,36 +95,16 @@ fn check(backend: &mut dyn Backend) {
     }
 }
 
-fn wgpu() -> Option<WgpuBackend> {
-    match WgpuBackend::new(&AdapterChoice::Default) {
-        Err(e @ OpenError::NoAdapter) => {
-            println!("no device: {e}");
-            None
-        }
-        opened => Some(opened.unwrap()),
-    }
-}
-
-fn ash() -> Option<AshBackend> {
-    match AshBackend::new(&Options::default()) {
-        Err(e @ (ConnectError::NoLoader { .. } | ConnectError::NoDevice)) => {
-            println!("no device: {e}");
-            None
-        }
-        connected => Some(connected.unwrap()),
-    }
-}
-
 #[test]
 fn batches_show_the_picture_of_one_with_wgpu() {
-    if let Some(mut backend) = wgpu() {
+    if let Some(mut backend) = devices::wgpu() {
         check(&mut backend);
     }
 }
 
 #[test]
 fn batches_show_the_picture_of_one_with_ash() {
-    if let Some(mut backend) = ash() {
+    if let Some(mut backend) = devices::ash(&Options::default()) {
         check(&mut backend);
     }
 }
@@ -154,7 +135,7 @@ const MUTANTS: [Mutant; 6] = [
 
 #[test]
 fn shaders_that_forget_what_batches_owe_each_other_are_noticed() {
-    let Some(mut backend) = ash() else { return };
+    let Some(mut backend) = devices::ash(&Options::default()) else { return };
     let source = source();
     let scenes = scenes(&source);
     let expected: Vec<Image<f32>> =

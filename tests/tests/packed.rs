@@ -1,6 +1,8 @@
 //! Packed slots, which the device unpacks, are those that the cpu unpacks, bit by bit, on either GPU backend; and a shader that unpacks
 //! them wrongly is noticed. Prints `no device` where there is none.
 
+mod devices;
+
 use std::sync::Arc;
 
 use brickfield::bricks::{BlockOptions, BrickTree, BuildOptions, build_blocks, build_tree};
@@ -14,9 +16,10 @@ use brickfield::{
     BlockResidency, BlockStyle, Residency, Scene, Skipping, TrimResidency, TrimmedVolume, Trimming, prepare,
     prepare_blocks, prepare_trimmed,
 };
-use brickfield_ash::{AshBackend, ConnectError, Options, Validation};
+use brickfield_ash::{AshBackend, Options, Validation};
 use brickfield_shaders::ShaderLibrary;
-use brickfield_wgpu::{AdapterChoice, OpenError, WgpuBackend};
+use brickfield_wgpu::WgpuBackend;
+use devices::on_both_backends;
 
 /// A backend on this machine's default device, with its own shaders or others.
 trait Open: Backend + Evaluate + Sized {
@@ -26,10 +29,7 @@ trait Open: Backend + Evaluate + Sized {
 
 impl Open for WgpuBackend {
     fn open(library: ShaderLibrary) -> Option<WgpuBackend> {
-        let mut backend = match WgpuBackend::new(&AdapterChoice::Default) {
-            Err(e @ OpenError::NoAdapter) => return no_device(&e),
-            opened => opened.unwrap(),
-        };
+        let mut backend = devices::wgpu()?;
         backend.set_library(library);
         Some(backend)
     }
@@ -37,30 +37,8 @@ impl Open for WgpuBackend {
 
 impl Open for AshBackend {
     fn open(library: ShaderLibrary) -> Option<AshBackend> {
-        connect(&Options::default()).map(|backend| backend.with_library(library))
+        devices::ash(&Options::default()).map(|backend| backend.with_library(library))
     }
-}
-
-fn connect(options: &Options) -> Option<AshBackend> {
-    match AshBackend::new(options) {
-        Err(e @ (ConnectError::NoLoader { .. } | ConnectError::NoDevice | ConnectError::NoValidationLayer)) => {
-            no_device(&e)
-        }
-        connected => Some(connected.unwrap()),
-    }
-}
-
-fn no_device<B>(why: &dyn std::error::Error) -> Option<B> {
-    println!("no device: {why}");
-    None
-}
-
-/// Each test on each backend.
-macro_rules! on_both_backends {
-    ($($test:ident)*) => {
-        mod wgpu { $(#[test] fn $test() { super::$test::<super::WgpuBackend>(); })* }
-        mod ash { $(#[test] fn $test() { super::$test::<super::AshBackend>(); })* }
-    };
 }
 
 on_both_backends! {
@@ -303,7 +281,7 @@ fn shaders_that_unpack_wrongly_are_noticed<B: Open>() {
 #[test]
 fn the_layer_is_silent_while_slots_are_unpacked() {
     let options = Options { validation: Validation::On, copy_bytes: 4096, ..Options::default() };
-    let Some(mut backend) = connect(&options) else { return };
+    let Some(mut backend) = devices::ash(&options) else { return };
     for volume in volumes() {
         backend.render(&plan(&tree(&volume, BrickSide::S16), &scene(&volume, PACKED))).unwrap();
     }

@@ -1,5 +1,7 @@
 //! Data that frames share stays on the device, and no old data is drawn, on either GPU backend. Prints `no device` where there is none.
 
+mod devices;
+
 use std::sync::Arc;
 
 use brickfield::bricks::{BlockOptions, build_blocks};
@@ -14,8 +16,9 @@ use brickfield::frame::{
 };
 use brickfield::optics::{Light, LightSource, LightTerms, Normals};
 use brickfield::{BlockResidency, BlockStyle, Classification, Scene, prepare_blocks};
-use brickfield_ash::{AshBackend, ConnectError, Options, Validation};
-use brickfield_wgpu::{AdapterChoice, OpenError, WgpuBackend};
+use brickfield_ash::{AshBackend, Options, Validation};
+use brickfield_wgpu::WgpuBackend;
+use devices::on_both_backends;
 
 /// A backend on this machine's default device.
 trait Open: Backend + Evaluate + Sized {
@@ -25,39 +28,14 @@ trait Open: Backend + Evaluate + Sized {
 
 impl Open for WgpuBackend {
     fn open() -> Option<WgpuBackend> {
-        match WgpuBackend::new(&AdapterChoice::Default) {
-            Err(e @ OpenError::NoAdapter) => no_device(&e),
-            opened => Some(opened.unwrap()),
-        }
+        devices::wgpu()
     }
 }
 
 impl Open for AshBackend {
     fn open() -> Option<AshBackend> {
-        connect(&Options { validation: Validation::Off, ..Options::default() })
+        devices::ash(&Options { validation: Validation::Off, ..Options::default() })
     }
-}
-
-fn connect(options: &Options) -> Option<AshBackend> {
-    match AshBackend::new(options) {
-        Err(e @ (ConnectError::NoLoader { .. } | ConnectError::NoDevice | ConnectError::NoValidationLayer)) => {
-            no_device(&e)
-        }
-        connected => Some(connected.unwrap()),
-    }
-}
-
-fn no_device<B>(why: &dyn std::error::Error) -> Option<B> {
-    println!("no device: {why}");
-    None
-}
-
-/// Each test on each backend.
-macro_rules! on_both_backends {
-    ($($test:ident)*) => {
-        mod wgpu { $(#[test] fn $test() { super::$test::<super::WgpuBackend>(); })* }
-        mod ash { $(#[test] fn $test() { super::$test::<super::AshBackend>(); })* }
-    };
 }
 
 on_both_backends! {
@@ -256,7 +234,7 @@ fn an_unchanged_plan_brings_its_numbers_only<B: Open>() {
 #[test]
 fn the_layer_is_silent_while_an_atlas_grows_brick_by_brick() {
     let options = Options { validation: Validation::On, copy_bytes: BRICK_BYTES as usize, ..Options::default() };
-    let Some(mut backend) = connect(&options) else { return };
+    let Some(mut backend) = devices::ash(&options) else { return };
     grow(&mut backend, leaping);
     assert_eq!(backend.validation_messages(), Vec::<String>::new());
 }

@@ -1,6 +1,8 @@
 //! Which shader draws changes no picture, on either GPU backend; and pipelines that a file keeps are used only if they are whole and the
 //! driver's own. Prints `no device` where there is none.
 
+mod devices;
+
 use std::fs;
 use std::path::Path;
 
@@ -9,8 +11,8 @@ use brickfield::core::glam::{DVec3, UVec2, UVec3};
 use brickfield::core::{BrickSide, Camera, Grid, Image, Knot, TransferFunction, Volume};
 use brickfield::frame::{Backend, FramePlan, ShaderChoice};
 use brickfield::{Residency, Scene, prepare};
-use brickfield_ash::{AshBackend, ConnectError, Options, PipelineFile};
-use brickfield_wgpu::{AdapterChoice, OpenError, WgpuBackend};
+use brickfield_ash::{Options, PipelineFile};
+use devices::{ash, wgpu};
 
 /// A slope under transfer functions of 2 to 40 knots: each needs a search of its own.
 fn plans() -> Vec<FramePlan> {
@@ -30,25 +32,6 @@ fn plans() -> Vec<FramePlan> {
         prepare(&tree, &Scene::new(camera, UVec2::new(40, 32), transfer), &mut residency).unwrap()
     };
     [2, 5, 9, 17, 40].map(plan).to_vec()
-}
-
-fn wgpu() -> Option<WgpuBackend> {
-    match WgpuBackend::new(&AdapterChoice::Default) {
-        Err(e @ OpenError::NoAdapter) => no_device(&e),
-        opened => Some(opened.unwrap()),
-    }
-}
-
-fn ash(options: &Options) -> Option<AshBackend> {
-    match AshBackend::new(options) {
-        Err(e @ (ConnectError::NoLoader { .. } | ConnectError::NoDevice)) => no_device(&e),
-        connected => Some(connected.unwrap()),
-    }
-}
-
-fn no_device<B>(why: &dyn std::error::Error) -> Option<B> {
-    println!("no device: {why}");
-    None
 }
 
 fn pictures(backend: &mut dyn Backend, plans: &[FramePlan]) -> Vec<Image<f32>> {

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use brickfield_bricks::{BlockSource, FetchError, SourceId, average_box, block_summaries};
 use brickfield_core::glam::UVec3;
 use brickfield_core::{
-    BlockLayout, BlockSide, BlockSummary, Grid, Level, N_BLOCK_BINS, N_BLOCK_LEVELS, Rescale, Scalar, ScalarType,
-    ValueRange, Volume, Voxels, with_voxels,
+    BlockLayout, BlockSide, BlockSummary, Grid, Level, Rescale, Scalar, ScalarType, ValueRange, Volume, Voxels,
+    with_voxels,
 };
 use brickfield_io::ome_zarr::ZarrLevels;
 use brickfield_io::{Limits, Note, OpenError, OpenOptions, ReadError, VolumeFacts};
@@ -112,43 +112,28 @@ impl StoreBlocks {
             Some(summaries) => (summaries, Survey::default()),
             None => summarised(&levels, &layout, progress)?,
         };
-        let ranges = summaries.iter().map(|summary| summary.range);
-        let range = ranges.reduce(ValueRange::union).unwrap_or(ValueRange { min: 0.0, max: 0.0 });
-        let from = side.levels().map(|level| finest_above(&levels, level)).collect();
-        let (id, path) = (SourceId::unique(), path.to_owned());
-        Ok(StoreBlocks { id, path, layout, levels, from, summaries, range, is_clamped, survey })
+        let blocks = StoreBlocks::with_summaries(path, levels, layout, summaries);
+        Ok(StoreBlocks { is_clamped, survey, ..blocks })
     }
 
-    /// The blocks of a store of which one level is there: their summaries are those of its samples.
-    pub(crate) fn of_one_level(
+    /// Blocks of finite voxels, whose coarse samples lie in their range.
+    pub(crate) fn with_summaries(
         path: &Path,
         levels: ZarrLevels,
-        side: BlockSide,
-        level: Level,
-    ) -> Result<StoreBlocks, ReadError> {
-        let layout = BlockLayout::new(levels.facts().grid.dims(), side);
-        let (from, rescale) = (finest_above(&levels, level), levels.facts().rescale);
-        let (dims, shifts) = (levels.dims(from), levels.shifts(from).unwrap_or(UVec3::ZERO));
-        let samples = levels.box_voxels(from, UVec3::ZERO, dims)?;
-        let summary = |block: UVec3| {
-            let first = layout.first_voxel(block) >> shifts;
-            let end = ((layout.first_voxel(block) + layout.extent(block) - 1) >> shifts) + 1;
-            with_voxels!(&samples, v => summary_of_box(v, dims, (first, end), rescale))
-        };
-        let summaries: Vec<BlockSummary> = layout.blocks().map(summary).collect();
-        let range = summaries.iter().map(|summary| summary.range).reduce(ValueRange::union);
-        let from = side.levels().map(|level| finest_above(&levels, level)).collect();
-        Ok(StoreBlocks {
-            id: SourceId::unique(),
-            path: path.to_owned(),
-            layout,
-            levels,
-            from,
-            summaries,
-            range: range.unwrap_or(ValueRange { min: 0.0, max: 0.0 }),
-            is_clamped: false,
-            survey: Survey::default(),
-        })
+        layout: BlockLayout,
+        summaries: Vec<BlockSummary>,
+    ) -> StoreBlocks {
+        let ranges = summaries.iter().map(|summary| summary.range);
+        let range = ranges.reduce(ValueRange::union).unwrap_or(ValueRange { min: 0.0, max: 0.0 });
+        let from = layout.side().levels().map(|level| finest_above(&levels, level)).collect();
+        let (id, path, survey) = (SourceId::unique(), path.to_owned(), Survey::default());
+        StoreBlocks { id, path, layout, levels, from, summaries, range, is_clamped: false, survey }
+    }
+
+    /// The levels of the store.
+    #[cfg(feature = "fetch")]
+    pub(crate) fn stored_levels(&self) -> &ZarrLevels {
+        &self.levels
     }
 
     /// The store's folder.
@@ -209,6 +194,7 @@ impl StoreBlocks {
     }
 
     /// The volume at the level of the store that blocks of a level come from, over the same box.
+    #[cfg(feature = "fetch")]
     pub(crate) fn at_level(&self, level: Level) -> Result<Volume, ReadError> {
         self.stored_level(self.from[usize::from(level.0)])
     }
@@ -311,28 +297,6 @@ pub(crate) fn finest_above(levels: &ZarrLevels, level: Level) -> usize {
     let fits = |i: &usize| levels.shifts(*i).is_some_and(|s| s.cmple(UVec3::splat(level.0.into())).all());
     let fitting = (0..levels.n_levels()).filter(fits);
     fitting.max_by_key(|i| levels.shifts(*i).map(|s| s.element_sum())).unwrap_or(0)
-}
-
-/// The range and the mean of a box of samples; nothing is known of the voxels that they average.
-fn summary_of_box<T: Scalar>(
-    samples: &[T],
-    dims: UVec3,
-    (first, end): (UVec3, UVec3),
-    rescale: Rescale,
-) -> BlockSummary {
-    let (mut least, mut greatest, mut sum) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
-    for z in first.z..end.z {
-        for y in first.y..end.y {
-            let row = dims.x as usize * (y as usize + dims.y as usize * z as usize);
-            for sample in &samples[row + first.x as usize..row + end.x as usize] {
-                let stored = sample.to_f64();
-                (least, greatest, sum) = (least.min(stored), greatest.max(stored), sum + stored);
-            }
-        }
-    }
-    let range = rescale.values(ValueRange { min: least, max: greatest });
-    let mean = rescale.value(sum / (end - first).as_dvec3().element_product());
-    BlockSummary { range, mean, counts: [0; N_BLOCK_BINS], kept_variance: [1.0; N_BLOCK_LEVELS], variance: 0.0 }
 }
 
 /// Slices that are summarised at once: a layer of the largest blocks.

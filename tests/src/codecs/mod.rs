@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use clap::{Parser, ValueEnum};
 
 use crate::compare::rivals::RivalArgs;
-use crate::paper::{Findings, PaperError, print};
+use crate::paper::{Findings, PaperError, asked_parts, data_sets, print};
 
 /// Codecs on this project's data
 ///
@@ -66,21 +66,14 @@ impl Part {
 impl CodecsArgs {
     /// The parts to be run, each once.
     pub fn parts(&self) -> Vec<Part> {
-        let all = Part::value_variants().iter().copied();
-        all.filter(|part| self.part.is_empty() || self.part.contains(part)).collect()
+        asked_parts(&self.part)
     }
 
     /// The volumes that are asked for, of some paths below the folder of real volumes: their names, and their paths.
     fn volumes(&self, data: &[&str]) -> Result<Vec<(String, PathBuf)>, PaperError> {
-        let folder = self.data.as_ref().ok_or(PaperError::NoData)?;
-        let is_wanted = |path: &&&str| self.only.as_ref().is_none_or(|text| path.contains(text.as_str()));
-        let wanted: Vec<_> =
-            data.iter().filter(is_wanted).map(|path| ((*path).to_owned(), folder.join(path))).collect();
+        let wanted = data_sets(self.data.as_ref(), self.only.as_deref(), data)?;
         match wanted.iter().find(|(_, path)| !path.exists()) {
             Some((_, path)) => Err(PaperError::NoVolume { path: path.clone() }),
-            None if wanted.is_empty() => {
-                Err(PaperError::NoSuchData { only: self.only.clone().unwrap_or_default(), known: data.join(", ") })
-            }
             None => Ok(wanted),
         }
     }

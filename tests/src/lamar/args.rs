@@ -5,7 +5,7 @@ use brickfield::options::values;
 use brickfield_core::BrickSide;
 use clap::{Parser, ValueEnum};
 
-use crate::paper::PaperArgs;
+use crate::paper::{PaperArgs, asked_parts};
 
 /// LaMar, Hamann and Joy 1999 on this project's data
 ///
@@ -91,11 +91,8 @@ impl LamarArgs {
 
     /// The parts to be run, each once.
     pub fn parts(&self) -> Vec<Part> {
-        let all = Part::value_variants().iter().copied();
-        match self.part.is_empty() {
-            true => all.filter(|part| *part != Part::Views).collect(),
-            false => all.filter(|part| self.part.contains(part)).collect(),
-        }
+        let parts = asked_parts(&self.part).into_iter();
+        parts.filter(|part| !self.part.is_empty() || *part != Part::Views).collect()
     }
 }
 

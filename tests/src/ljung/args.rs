@@ -7,7 +7,7 @@ use brickfield_core::BlockSide;
 use brickfield_core::glam::UVec3;
 use clap::{Parser, ValueEnum};
 
-use crate::paper::PaperArgs;
+use crate::paper::{PaperArgs, asked_parts};
 
 /// Ljung, Lundstroem and Ynnerman 2006 on this project's data
 ///
@@ -104,8 +104,7 @@ impl Part {
 impl LjungArgs {
     /// The parts to be run, each once.
     pub fn parts(&self) -> Vec<Part> {
-        let all = Part::value_variants().iter().copied();
-        all.filter(|part| self.part.is_empty() || self.part.contains(part)).collect()
+        asked_parts(&self.part)
     }
 }
 

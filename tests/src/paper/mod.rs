@@ -144,21 +144,35 @@ impl PaperArgs {
             let name = |path: &PathBuf| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
             return Ok(self.files.iter().map(|path| (name(path), path.clone())).collect());
         }
-        let folder = self.data.as_ref().ok_or(PaperError::NoData)?;
-        if !folder.is_dir() {
-            return Err(PaperError::NoFolder { path: folder.clone() });
-        }
-        let wanted = |path: &&&str| self.only.as_ref().is_none_or(|text| path.contains(text.as_str()));
-        let sets: Vec<_> = data.iter().filter(wanted).map(|path| ((*path).to_owned(), folder.join(path))).collect();
-        match sets.is_empty() {
-            true => Err(PaperError::NoSuchData { only: self.only.clone().unwrap_or_default(), known: data.join(", ") }),
-            false => Ok(sets),
-        }
+        data_sets(self.data.as_ref(), self.only.as_deref(), data)
     }
 
     /// Rows as a JSON file of the output folder.
     pub(crate) fn write_rows<R: serde::Serialize>(&self, name: &str, rows: &[R]) -> Result<(), PaperError> {
         write_rows(&self.out.join(name), rows)
+    }
+}
+
+/// The parts that are asked for, each once and in their order; all if none is.
+pub(crate) fn asked_parts<P: ValueEnum + PartialEq>(asked: &[P]) -> Vec<P> {
+    P::value_variants().iter().filter(|part| asked.is_empty() || asked.contains(part)).cloned().collect()
+}
+
+/// The data sets below a folder of which the path has a text: their names in the tables, and their paths.
+pub(crate) fn data_sets(
+    folder: Option<&PathBuf>,
+    only: Option<&str>,
+    data: &[&str],
+) -> Result<Vec<(String, PathBuf)>, PaperError> {
+    let folder = folder.ok_or(PaperError::NoData)?;
+    if !folder.is_dir() {
+        return Err(PaperError::NoFolder { path: folder.clone() });
+    }
+    let wanted = |path: &&&str| only.is_none_or(|text| path.contains(text));
+    let sets: Vec<_> = data.iter().filter(wanted).map(|path| ((*path).to_owned(), folder.join(path))).collect();
+    match sets.is_empty() {
+        true => Err(PaperError::NoSuchData { only: only.unwrap_or_default().to_owned(), known: data.join(", ") }),
+        false => Ok(sets),
     }
 }
 

@@ -4,7 +4,7 @@ use brickfield::options::values;
 use brickfield_core::BlockSide;
 use clap::{Parser, ValueEnum};
 
-use crate::paper::PaperArgs;
+use crate::paper::{PaperArgs, asked_parts};
 
 /// Saladi, Pinnamaneni and Meyer 2003 on this project's data
 ///
@@ -65,8 +65,7 @@ impl Part {
 impl SaladiArgs {
     /// The parts to be run, each once.
     pub fn parts(&self) -> Vec<Part> {
-        let all = Part::value_variants().iter().copied();
-        all.filter(|part| self.part.is_empty() || self.part.contains(part)).collect()
+        asked_parts(&self.part)
     }
 }
 

@@ -62,14 +62,14 @@ pub(super) fn run(args: &SaladiArgs, rivals: &mut Rivals) -> Result<Vec<Missed>,
             Scene { step_voxels: args.common.step, ..Scene::new(camera, args.common.size, automatic(&opened.volume)) };
         let half = 0.25 * opened.volume.grid().dims().as_dvec3();
         let region = Aabb { min: half, max: 3.0 * half };
-        for codec in [Codec::Haar, Codec::Zstd] {
-            let store = store(args, &name, &path, codec)?;
-            let row = timed(&name, codec, &store, &scene, &region)?;
+        let haar = store(args, &name, &path, Codec::Haar)?;
+        let zstd = store(args, &name, &path, Codec::Zstd)?;
+        for (codec, store) in [(Codec::Haar, &haar), (Codec::Zstd, &zstd)] {
+            let row = timed(&name, codec, store, &scene, &region)?;
             print_row(&row)?;
             rows.push(row);
         }
-        let store = store(args, &name, &path, Codec::Haar)?;
-        missed.extend(with_faults(backend.as_mut(), &name, &store, &scene)?);
+        missed.extend(with_faults(backend.as_mut(), &name, &haar, &scene)?);
     }
     args.common.write_rows("saladi-served.json", &rows)?;
     Ok(missed)

@@ -4,7 +4,7 @@ use brickfield::options::values;
 use brickfield_core::BrickSide;
 use clap::{Parser, ValueEnum};
 
-use crate::paper::PaperArgs;
+use crate::paper::{PaperArgs, asked_parts};
 
 /// Tong, Wang, Tsang and Tang 1999 on this project's data
 ///
@@ -71,7 +71,6 @@ impl Part {
 impl TongArgs {
     /// The parts to be run, each once.
     pub fn parts(&self) -> Vec<Part> {
-        let all = Part::value_variants().iter().copied();
-        all.filter(|part| self.part.is_empty() || self.part.contains(part)).collect()
+        asked_parts(&self.part)
     }
 }

@@ -1,7 +1,7 @@
 //! The chunks of a store as items that are fetched.
 
 use brickfield_core::glam::UVec3;
-use brickfield_core::{Aabb, BlockLayout, Level};
+use brickfield_core::{BlockLayout, Level};
 use brickfield_io::ome_zarr::{ObjectRange, StoredChunk, ZarrLevels};
 use brickfield_lod::FetchItem;
 
@@ -63,15 +63,4 @@ impl Chunks {
         let fine = self.items.iter_mut().filter(|item| item.level == Level(0));
         fine.for_each(|item| item.refines = holders[layout.ordinal(item.first_block)]);
     }
-}
-
-/// The weights of blocks within a box of index space; 0 for others.
-pub(super) fn weights_within(region: &Aabb, layout: &BlockLayout, weights: &[f32]) -> Vec<f32> {
-    let is_within = |ordinal: usize| {
-        let first = layout.first_voxel(layout.block(ordinal));
-        let extent = layout.extent(layout.block(ordinal));
-        let block = Aabb { min: first.as_dvec3(), max: (first + extent).as_dvec3() };
-        !region.intersection(&block).is_empty()
-    };
-    weights.iter().enumerate().map(|(ordinal, weight)| if is_within(ordinal) { *weight } else { 0.0 }).collect()
 }

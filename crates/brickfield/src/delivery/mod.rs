@@ -10,6 +10,7 @@
 //! Pictures are drawn from the bytes that have arrived, and from no others: [`Delivery::blocks`] reads nothing else.
 
 mod chunks;
+mod one_level;
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -28,7 +29,8 @@ use brickfield_lod::{
 
 use crate::store::finest_above;
 use crate::{Scene, StoreBlocks, StoreLimits};
-use chunks::{Chunks, weights_within};
+use chunks::Chunks;
+use one_level::of_one_level;
 
 /// Why a store is not delivered. What had arrived stays.
 #[derive(Debug, thiserror::Error)]
@@ -70,7 +72,8 @@ pub struct Delivery {
     known: Level,
     blocks: StoreBlocks,
     levels: Vec<Level>,
-    n_bytes: u64,
+    /// Bytes of documents that another one states: they did not arrive.
+    n_stated_bytes: u64,
 }
 
 /// What is fetched of a store for a view, in order.
@@ -106,18 +109,17 @@ impl Delivery {
             arrived.insert_whole(key, bytes)?;
         }
         client.deliver(&others.into_iter().map(Request::whole).collect::<Vec<_>>(), &arrived)?;
-        let n_bytes_stated: u64 = stated.iter().map(|(_, bytes)| bytes.len() as u64).sum();
+        let n_stated_bytes = stated.iter().map(|(_, bytes)| bytes.len() as u64).sum();
         let levels = opened(&arrived, location, limits)?;
         if !levels.is_packed() {
             return Err(DeliveryError::NotPacked { location: location.to_owned() });
         }
         let known = overview_level(&levels);
         client.deliver(&requests(levels.whole_level(finest_above(&levels, known))), &arrived)?;
-        let blocks = StoreBlocks::of_one_level(Path::new(location), levels, SIDE, known)?;
+        let blocks = of_one_level(Path::new(location), levels, SIDE, known)?;
         let levels = vec![known; blocks.layout().n_blocks_total()];
-        let n_bytes = arrived.n_arrived_bytes() - n_bytes_stated;
         let location = location.to_owned();
-        Ok(Delivery { location, client, arrived, limits, known, blocks, levels, n_bytes })
+        Ok(Delivery { location, client, arrived, limits, known, blocks, levels, n_stated_bytes })
     }
 
     /// The blocks, of which the levels that have arrived can be fetched; nothing else is read.
@@ -132,7 +134,7 @@ impl Delivery {
 
     /// Bytes that have arrived.
     pub fn n_bytes(&self) -> u64 {
-        self.n_bytes
+        self.arrived.n_arrived_bytes() - self.n_stated_bytes
     }
 
     /// What the client has done.
@@ -153,7 +155,7 @@ impl Delivery {
     /// # Errors
     /// What the reader says.
     pub fn n_plan_bytes(&self) -> Result<u64, DeliveryError> {
-        let levels = opened(&self.arrived, &self.location, self.limits)?;
+        let levels = self.blocks.stored_levels();
         let summaries = levels.n_stored_summary_bytes(SIDE)?;
         let summaries = summaries.ok_or_else(|| DeliveryError::NotPacked { location: self.location.clone() })?;
         let indices = (0..levels.n_levels()).flat_map(|level| levels.indices(level));
@@ -164,7 +166,7 @@ impl Delivery {
     }
 
     fn plan_requests(&self) -> Result<Vec<Request>, DeliveryError> {
-        let levels = opened(&self.arrived, &self.location, self.limits)?;
+        let levels = self.blocks.stored_levels();
         let coarsest = levels.n_levels() - 1;
         let mut ranges = levels.stored_summaries(SIDE)?;
         ranges.extend((0..levels.n_levels()).flat_map(|level| levels.indices(level)));
@@ -179,7 +181,7 @@ impl Delivery {
     /// # Errors
     /// What the client or the reader says.
     pub fn plan(&mut self, scene: &Scene, region: Option<&Aabb>) -> Result<DeliveryPlan, DeliveryError> {
-        self.fetch_requests(&self.plan_requests()?)?;
+        self.client.deliver(&self.plan_requests()?, &self.arrived)?;
         let levels = opened(&self.arrived, &self.location, self.limits)?;
         let chunks = Chunks::below(self.known, &levels, self.blocks.layout())?;
         let path = PathBuf::from(&self.location);
@@ -187,11 +189,13 @@ impl Delivery {
         let (layout, grid) = (*self.blocks.layout(), *self.blocks.grid());
         let slab = Slab::of_block(&layout, &grid);
         let errors = BlockErrors::estimate(&layout, self.blocks.summaries(), &scene.transfer, slab)?;
-        let view = BlockView { view: scene.view(), clip: scene.clip, importance: Importance::default() };
-        let seen = block_weights(&layout, &grid, &view);
-        let mut phases: Vec<Vec<f32>> =
-            region.map(|region| weights_within(region, &layout, &seen)).into_iter().collect();
-        phases.push(seen);
+        let seen_in = |clip: Option<Aabb>| {
+            let view = BlockView { view: scene.view(), clip, importance: Importance::default() };
+            block_weights(&layout, &grid, &view)
+        };
+        let region = region.map(|region| scene.clip.map_or(*region, |clip| clip.intersection(region)));
+        let phases: Vec<Vec<f32>> =
+            region.map(|region| seen_in(Some(region))).into_iter().chain([seen_in(scene.clip)]).collect();
         let order = fetch_order(&layout, errors.levels(), &phases, self.known, &chunks.items)?;
         Ok(DeliveryPlan { items: chunks.items, bytes: chunks.bytes, order, n_fetched: 0 })
     }
@@ -212,7 +216,8 @@ impl Delivery {
             (n, n_bytes) = (n + 1, next);
         }
         let fetched: Vec<usize> = rest[..n].to_vec();
-        self.fetch_requests(&requests(fetched.iter().map(|item| plan.bytes[*item].clone()).collect()))?;
+        let ranges = fetched.iter().map(|item| plan.bytes[*item].clone()).collect();
+        self.client.deliver(&requests(ranges), &self.arrived)?;
         for item in fetched {
             let FetchItem { level, .. } = plan.items[item];
             for block in plan.items[item].blocks() {
@@ -222,14 +227,6 @@ impl Delivery {
         }
         plan.n_fetched += n;
         Ok(n)
-    }
-
-    fn fetch_requests(&mut self, requests: &[Request]) -> Result<(), DeliveryError> {
-        let before = self.arrived.n_arrived_bytes();
-        let outcome = self.client.deliver(requests, &self.arrived);
-        self.n_bytes += self.arrived.n_arrived_bytes() - before;
-        outcome?;
-        Ok(())
     }
 }
 
