@@ -25,6 +25,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use brickfield_core::glam::UVec3;
 use zarrs::filesystem::FilesystemStore;
 use zarrs::storage::store::MemoryStore;
 use zarrs::storage::{ListableStorageTraits, ReadableStorage, ReadableStorageTraits, StoreKey, WritableStorageTraits};
@@ -89,4 +90,9 @@ fn read_from(
     found.notes.extend(note);
     let voxels = shape.converted(voxels, &mut found.notes)?;
     found.finish_rescaled(grid, voxels, image.rescale)
+}
+
+/// The positions of a box from 0 on, x fastest.
+fn positions(n: UVec3) -> impl Iterator<Item = UVec3> {
+    (0..n.z).flat_map(move |z| (0..n.y).flat_map(move |y| (0..n.x).map(move |x| UVec3::new(x, y, z))))
 }

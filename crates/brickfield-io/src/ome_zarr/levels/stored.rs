@@ -11,6 +11,7 @@ use super::parts::{Parts, StoredPlace};
 use crate::ReadError;
 use crate::ome_zarr::metadata::ArrayMetadata;
 use crate::ome_zarr::node::{Node, joined};
+use crate::ome_zarr::positions;
 
 /// A range of bytes of an object; all of it if there is no range.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -145,8 +146,4 @@ impl ZarrLevels {
         }
         Ok(chunks)
     }
-}
-
-fn positions(n: UVec3) -> impl Iterator<Item = UVec3> {
-    (0..n.z).flat_map(move |z| (0..n.y).flat_map(move |y| (0..n.x).map(move |x| UVec3::new(x, y, z))))
 }

@@ -12,6 +12,7 @@ use super::Fault;
 use super::level::CHUNK_SIDE;
 use crate::ReadError;
 use crate::numbers::{ByteOrder, FileScalar, with_room};
+use crate::ome_zarr::positions;
 
 /// The codec's name.
 pub(in super::super) const DETAILS_CODEC: &str = "brickfield.haar_details";
@@ -77,8 +78,7 @@ fn brick_of<T: Scalar>(layer: &[T], dims: UVec3, first: UVec3) -> (UVec3, Vec<T>
 fn morton_order(n: UVec3) -> Vec<UVec3> {
     let spread = |i: u32| (0..10).fold(0u32, |code, bit| code | (i >> bit & 1) << (3 * bit));
     let code = |p: &UVec3| spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2;
-    let positions = (0..n.z).flat_map(|z| (0..n.y).flat_map(move |y| (0..n.x).map(move |x| UVec3::new(x, y, z))));
-    let mut chunks: Vec<UVec3> = positions.collect();
+    let mut chunks: Vec<UVec3> = positions(n).collect();
     chunks.sort_by_key(code);
     chunks
 }
