@@ -13,6 +13,7 @@ mod ray;
 mod rescale;
 mod scalar;
 mod space;
+mod structured;
 mod transfer;
 mod volume;
 
@@ -30,5 +31,6 @@ pub use ray::{Aabb, Ray, Span};
 pub use rescale::{Rescale, RescaleError};
 pub use scalar::{Scalar, ScalarType, Voxels};
 pub use space::{IndexPos, SamplePos, WorldPos};
+pub use structured::{GridPoints, NodeField, StructuredGrid, StructuredGridError};
 pub use transfer::{Knot, LinearRgb, Optics, TransferError, TransferFunction};
 pub use volume::{NonFinite, ValueRange, Volume, VolumeError};
