@@ -104,6 +104,7 @@ pub trait Chunked {
 #[derive(Clone, Debug)]
 pub(crate) struct Pages {
     bytes: Vec<u8>,
+    page_bytes: usize,
     id: ContentId,
     pages: Vec<ContentId>,
 }
@@ -113,8 +114,13 @@ const PAGE_BYTES: usize = 4096;
 
 impl Pages {
     pub(crate) fn new(bytes: &[u8]) -> Pages {
-        let pages = (0..bytes.len().div_ceil(PAGE_BYTES)).map(|_| ContentId::new()).collect();
-        Pages { bytes: bytes.to_vec(), id: ContentId::new(), pages }
+        Pages::of(bytes, PAGE_BYTES)
+    }
+
+    /// A table in pages of so many bytes.
+    pub(crate) fn of(bytes: &[u8], page_bytes: usize) -> Pages {
+        let pages = (0..bytes.len().div_ceil(page_bytes)).map(|_| ContentId::new()).collect();
+        Pages { bytes: bytes.to_vec(), page_bytes, id: ContentId::new(), pages }
     }
 
     /// Pages that are equal to those of a table before it keep their identity.
@@ -122,7 +128,7 @@ impl Pages {
         if self.bytes == before.bytes {
             self.id = before.id;
         }
-        let pages = self.bytes.chunks(PAGE_BYTES).zip(before.bytes.chunks(PAGE_BYTES));
+        let pages = self.bytes.chunks(self.page_bytes).zip(before.bytes.chunks(before.page_bytes));
         for ((own, (a, b)), id) in self.pages.iter_mut().zip(pages).zip(&before.pages) {
             if a == b {
                 *own = *id;
@@ -137,7 +143,7 @@ impl Chunked for Pages {
     }
 
     fn chunk_bytes(&self) -> usize {
-        PAGE_BYTES
+        self.page_bytes
     }
 
     fn n_chunks(&self) -> usize {
@@ -145,8 +151,8 @@ impl Chunked for Pages {
     }
 
     fn chunk(&self, i: usize) -> Option<(ContentId, &[u8])> {
-        let start = i * PAGE_BYTES;
-        Some((self.pages[i], &self.bytes[start..self.bytes.len().min(start + PAGE_BYTES)]))
+        let start = i * self.page_bytes;
+        Some((self.pages[i], &self.bytes[start..self.bytes.len().min(start + self.page_bytes)]))
     }
 }
 

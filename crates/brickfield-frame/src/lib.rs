@@ -7,6 +7,7 @@ mod facets;
 mod feature;
 mod field;
 mod lighting;
+mod mesh;
 mod packed;
 mod pass;
 mod plan;
@@ -20,6 +21,7 @@ mod spoil;
 mod surfaces;
 mod uniform;
 mod value_scale;
+mod view_rays;
 
 pub use adapter::AdapterKind;
 pub use backend::{
@@ -34,6 +36,10 @@ pub use field::{
     IndexLattice, Join, Packing, Places, Reach, Room, RoomChange, SampleFormat, Slots, SlotsError, TextureShape,
 };
 pub use lighting::{LightUniform, Lighting};
+pub use mesh::{
+    Coloring, Mesh, MeshBackend, MeshError, MeshFrame, MeshLines, MeshPlan, MeshPlanError, MeshShading, MeshTriangle,
+    MeshUniforms, MeshVertex, MeshView,
+};
 pub use packed::{DecodingUniforms, PackedSamples, PackedUniform, Upload};
 pub use pass::Pass;
 pub use plan::{Drawing, FramePlan, PlanError, PlanParts, Sequence};
@@ -47,3 +53,4 @@ pub use spoil::SpoiltPlan;
 pub use surfaces::{Placement, PlacementError, PlaneStacks, Steps};
 pub use uniform::{FrameUniforms, KnotUniform, PlaceUniform};
 pub use value_scale::ValueScale;
+pub use view_rays::{ViewRay, ViewRays};

@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 
-use crate::{Chunked, FramePlan, KnotUniform, LightUniform, Slots};
+use crate::mesh::color_knots;
+use crate::{Chunked, FramePlan, KnotUniform, LightUniform, MeshPlan, MeshUniforms, Slots};
 
 /// A buffer, texture or sampler, by the name that it has in shaders (`frame.wesl`).
 ///
@@ -69,6 +70,14 @@ pub enum Resource {
     Coefficients,
     /// The texels of packed slots, on their way to the atlas.
     Texels,
+    /// The numbers of a mesh's picture ([`MeshUniforms`](crate::MeshUniforms)).
+    MeshView,
+    /// The vertices of a mesh ([`MeshVertex`](crate::MeshVertex)).
+    Vertices,
+    /// The triangles of a mesh ([`MeshTriangle`](crate::MeshTriangle)).
+    Triangles,
+    /// The knots of a mesh's colour map.
+    Colors,
 }
 
 /// The data that a plan brings for a resource.
@@ -83,7 +92,7 @@ pub enum Content<'a> {
 
 impl Resource {
     /// All resources.
-    pub const ALL: [Resource; 29] = [
+    pub const ALL: [Resource; 33] = [
         Resource::Frame,
         Resource::Atlas,
         Resource::AtlasSampler,
@@ -113,6 +122,10 @@ impl Resource {
         Resource::PackedWords,
         Resource::Coefficients,
         Resource::Texels,
+        Resource::MeshView,
+        Resource::Vertices,
+        Resource::Triangles,
+        Resource::Colors,
     ];
 
     /// The name in shaders and messages.
@@ -147,6 +160,10 @@ impl Resource {
             Resource::PackedWords => "packed_words",
             Resource::Coefficients => "coefficients",
             Resource::Texels => "texels",
+            Resource::MeshView => "mesh_view",
+            Resource::Vertices => "vertices",
+            Resource::Triangles => "triangles",
+            Resource::Colors => "colors",
         }
     }
 
@@ -193,7 +210,25 @@ impl FramePlan {
             | Resource::PackedBricks
             | Resource::PackedWords
             | Resource::Coefficients
-            | Resource::Texels => None,
+            | Resource::Texels
+            | Resource::MeshView
+            | Resource::Vertices
+            | Resource::Triangles
+            | Resource::Colors => None,
+        }
+    }
+}
+
+impl MeshPlan {
+    /// The content of a resource; `None` if meshes do not have it.
+    pub fn content(&self, resource: Resource) -> Option<Content<'_>> {
+        let bytes = |bytes: &[u8]| Some(Content::Bytes(Cow::Owned(bytes.to_vec())));
+        match resource {
+            Resource::MeshView => bytes(bytemuck::bytes_of(&MeshUniforms::of(self))),
+            Resource::Vertices => Some(Content::Chunks(self.mesh().vertex_table())),
+            Resource::Triangles => Some(Content::Chunks(self.mesh().triangle_table())),
+            Resource::Colors => bytes(bytemuck::cast_slice(&color_knots(self))),
+            _ => None,
         }
     }
 }

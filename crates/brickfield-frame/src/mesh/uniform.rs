@@ -1,0 +1,97 @@
+//! The numbers of a mesh's picture as shaders read them.
+
+use brickfield_core::glam::DVec3;
+use brickfield_optics::LightSource;
+use bytemuck::{Pod, Zeroable};
+
+use super::MeshPlan;
+
+/// The uniform block of a mesh's picture. Positions are relative to the mesh's centre, in world units; the layout is held against
+/// naga's by a test of `brickfield-shaders`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct MeshUniforms {
+    /// The rows of the matrix from positions to the clip space of WebGPU: x, y, z (1 at the nearest, 0 at infinity or at the farthest), w.
+    pub clip: [[f32; 4]; 4],
+    /// Anchor of the picture's centre; and the depth of the anchors' plane.
+    pub anchor: [f32; 4],
+    /// Change of the anchor a pixel to the right; half the picture's width.
+    pub anchor_right: [f32; 4],
+    /// Change of the anchor a pixel down; half the picture's height.
+    pub anchor_down: [f32; 4],
+    /// Direction of the picture's centre; half the width of mesh lines, in pixels.
+    pub direction: [f32; 4],
+    /// Change of the direction a pixel to the right; the part of the colour that shows from everywhere.
+    pub direction_right: [f32; 4],
+    /// Change of the direction a pixel down; the part that shows where the mesh faces the light.
+    pub direction_down: [f32; 4],
+    /// The colour of mesh lines; the brightness of highlights.
+    pub line: [f32; 4],
+    /// Towards the light (w: 0), or its place (w: 1); a headlight has w = -1.
+    pub source: [f32; 4],
+    /// Knots of the colour map.
+    pub n_knots: u32,
+    /// The exponent of highlights.
+    pub shininess: u32,
+    /// Nothing.
+    pub padding: [u32; 2],
+}
+
+fn row(v: DVec3, w: f64) -> [f32; 4] {
+    [v.x as f32, v.y as f32, v.z as f32, w as f32]
+}
+
+impl MeshUniforms {
+    /// The numbers of a plan.
+    pub fn of(plan: &MeshPlan) -> MeshUniforms {
+        let rays = &plan.rays;
+        let half = 0.5 * rays.size.as_dvec2();
+        let (light, line) = (plan.light.as_ref(), plan.lines.as_ref());
+        let terms = light.map(|light| light.terms()).unwrap_or_default();
+        MeshUniforms {
+            clip: clip(plan),
+            anchor: row(rays.anchor[0], rays.anchor_depth),
+            anchor_right: row(rays.anchor[1], half.x),
+            anchor_down: row(rays.anchor[2], half.y),
+            direction: row(rays.direction[0], line.map_or(0.0, |line| 0.5 * line.width)),
+            direction_right: row(rays.direction[1], terms.ambient),
+            direction_down: row(rays.direction[2], terms.diffuse),
+            line: row(line.map_or(DVec3::ZERO, |line| DVec3::from_array(line.color)), terms.specular),
+            source: match light.map(|light| light.source()) {
+                None | Some(LightSource::Head) => row(DVec3::ZERO, -1.0),
+                Some(LightSource::Direction(direction)) => row(direction, 0.0),
+                Some(LightSource::Place(place)) => row(place - plan.mesh.center(), 1.0),
+            },
+            n_knots: plan.colors.knots().len() as u32,
+            shininess: terms.shininess,
+            padding: [0; 2],
+        }
+    }
+}
+
+/// From positions to clip space. A perspective picture has its depth reversed, near / depth, so that f32 keeps its digits far away;
+/// of parallel rays depth falls evenly from 1 to 0 through the part of the mesh that lies before the eye's plane.
+fn clip(plan: &MeshPlan) -> [[f32; 4]; 4] {
+    let rays = &plan.rays;
+    let half = 0.5 * rays.size.as_dvec2();
+    let eye = rays.eye();
+    let across = |axis: DVec3, scale: f64| {
+        let axis = axis / axis.length_squared() * scale;
+        row(axis, -axis.dot(eye))
+    };
+    let (x, y) = (across(rays.pixel[0], 1.0 / half.x), across(rays.pixel[1], -1.0 / half.y));
+    let [forward, ..] = rays.direction;
+    if !rays.are_parallel() {
+        return [x, y, row(DVec3::ZERO, plan.near), row(forward, -forward.dot(eye))];
+    }
+    let reach = plan.mesh.radius().max(f64::MIN_POSITIVE) * 1.01;
+    let nearest = (-reach).max(-rays.anchor_depth);
+    let thickness = (reach - nearest).max(f64::MIN_POSITIVE);
+    [x, y, row(-forward / thickness, reach / thickness), row(DVec3::ZERO, 1.0)]
+}
+
+/// A knot of the colour map as shaders read it: its value, red, green and blue.
+pub(crate) fn color_knots(plan: &MeshPlan) -> Vec<[f32; 4]> {
+    let knot = |k: &brickfield_core::Knot| row(DVec3::from_array(k.color), k.value);
+    plan.colors.knots().iter().map(knot).collect()
+}
