@@ -5,7 +5,9 @@ pub mod closed_form;
 mod continuous;
 mod discrete;
 mod fast;
+mod mesh;
 
 pub use continuous::{Continuous, ContinuousOptions, RayIntegral, continuous, continuous_ray};
 pub use discrete::{Discrete, discrete, filter_rounding, position_rounding};
 pub use fast::CpuBackend;
+pub use mesh::mesh_pixels;

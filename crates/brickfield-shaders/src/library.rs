@@ -27,7 +27,7 @@ const fn one_of(path: &'static str, name: &'static str, text: &'static str) -> M
     Module { name, path, text: Cow::Borrowed(text) }
 }
 
-const EMBEDDED: [Module; 27] = [
+const EMBEDDED: [Module; 28] = [
     own("frame", include_str!("wesl/frame.wesl")),
     own("scalar", include_str!("wesl/scalar.wesl")),
     own("transfer", include_str!("wesl/transfer.wesl")),
@@ -55,6 +55,7 @@ const EMBEDDED: [Module; 27] = [
     own("evaluate", include_str!("wesl/evaluate.wesl")),
     own("probe", include_str!("wesl/probe.wesl")),
     own("decode", include_str!("wesl/decode.wesl")),
+    own("mesh", include_str!("wesl/mesh.wesl")),
 ];
 
 /// The shader sources: modules of WESL text by name.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
-use brickfield_frame::{FramePlan, RenderError, ShaderChoice, Target};
+use brickfield_frame::{FramePlan, MeshPlan, RenderError, ShaderChoice, Target};
 
 use crate::trial::Trial;
 use crate::{Entry, Variant};
@@ -67,9 +67,14 @@ impl PipelineKey {
         PipelineKey { variant: Variant::of(plan, entry), target }
     }
 
-    /// The pipeline of a variant that computes.
+    /// The pipeline of a variant that blends nothing.
     pub fn computing(variant: Variant) -> PipelineKey {
         PipelineKey { variant, target: Target::default() }
+    }
+
+    /// The pipeline that draws a mesh.
+    pub fn mesh(plan: &MeshPlan) -> PipelineKey {
+        PipelineKey::computing(Variant::mesh(plan.shading()))
     }
 
     /// The pipeline that unpacks the slots of a plan, if any are packed.

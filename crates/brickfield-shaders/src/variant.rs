@@ -2,8 +2,8 @@
 
 use brickfield_core::Interblock;
 use brickfield_frame::{
-    Division, Feature, FeatureSet, Fetch, FramePlan, Join, Lengths, Placement, Places, QuadratureRule, ShaderFunction,
-    Slices,
+    Coloring, Division, Feature, FeatureSet, Fetch, FramePlan, Join, Lengths, MeshShading, Placement, Places,
+    QuadratureRule, ShaderFunction, Slices,
 };
 
 use crate::passes::has_long_rays;
@@ -211,6 +211,8 @@ pub enum Entry {
     Probe(Fetch),
     /// Unpacks the samples of slots ([`crate::Decoding`]).
     Decode,
+    /// Renders the picture of a mesh ([`brickfield_frame::MeshPlan`]): a vertex and a fragment shader.
+    Mesh(MeshShading),
 }
 
 impl Entry {
@@ -222,6 +224,7 @@ impl Entry {
             .chain(functions)
             .chain(Fetch::ALL.map(Entry::Probe))
             .chain([Entry::Decode])
+            .chain(MeshShading::all().map(Entry::Mesh))
     }
 
     /// The names of the entry points: one for compute, or one for vertices and one for fragments.
@@ -233,6 +236,7 @@ impl Entry {
             Entry::Probe(Fetch::Filtered) => &["filtered"],
             Entry::Probe(Fetch::Loaded) => &["loaded"],
             Entry::Decode => &["decode"],
+            Entry::Mesh(_) => &["place", "paint"],
         }
     }
 
@@ -244,6 +248,7 @@ impl Entry {
             Entry::Evaluate(_) => "evaluate",
             Entry::Probe(_) => "probe",
             Entry::Decode => "decode",
+            Entry::Mesh(_) => "mesh",
         }
     }
 }
@@ -299,7 +304,7 @@ impl Variant {
         };
         match self.entry {
             Entry::March | Entry::Proxy(_) => Variant { features, search, ..self },
-            Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => self,
+            Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode | Entry::Mesh(_) => self,
         }
     }
 
@@ -338,6 +343,11 @@ impl Variant {
         Variant::new(FeatureSet::default(), QuadratureRule::MidpointExponential, Entry::Decode)
     }
 
+    /// The shader that draws a mesh. It has nothing of a volume's.
+    pub fn mesh(shading: MeshShading) -> Variant {
+        Variant::new(FeatureSet::default(), QuadratureRule::MidpointExponential, Entry::Mesh(shading))
+    }
+
     /// The conditions (`@if(name)`) that hold.
     pub(crate) fn conditions(self) -> Vec<(String, bool)> {
         let has = |f| self.features.contains(f);
@@ -351,6 +361,10 @@ impl Variant {
         let evaluated = |f| self.entry == Entry::Evaluate(f);
         let functions = ShaderFunction::ALL.into_iter().map(|f| (format!("evaluate_{}", f.name()), evaluated(f)));
         let two_nodes = self.rule.nodes().len() > 1;
+        let shading = match self.entry {
+            Entry::Mesh(shading) => shading,
+            _ => MeshShading::default(),
+        };
         let derived = [
             ("one_node", !two_nodes),
             ("two_nodes", two_nodes),
@@ -364,6 +378,10 @@ impl Variant {
             ("long_rays", self.long_rays),
             ("rays_go_on", self.long_rays || self.batch),
             ("integer_samples", self.integer_samples),
+            ("gouraud", shading.coloring == Coloring::Gouraud),
+            ("mesh_light", shading.lit),
+            ("mesh_normals", shading.has_normals),
+            ("mesh_lines", shading.has_lines),
         ];
         let derived = derived.into_iter().map(|(name, holds)| (name.to_owned(), holds));
         let scheme = |s: Interblock| (s.name().replace('-', "_"), self.field.scheme() == Some(s));

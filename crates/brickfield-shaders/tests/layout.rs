@@ -3,8 +3,8 @@
 use std::mem::{offset_of, size_of};
 
 use brickfield_frame::{
-    DecodingUniforms, Feature, FeatureSet, Fetch, FrameUniforms, KnotUniform, LightUniform, PackedUniform,
-    PlaceUniform, ProbeUniforms, QuadratureRule,
+    DecodingUniforms, Feature, FeatureSet, Fetch, FrameUniforms, KnotUniform, LightUniform, MeshShading, MeshUniforms,
+    MeshVertex, PackedUniform, PlaceUniform, ProbeUniforms, QuadratureRule,
 };
 use brickfield_shaders::naga::{Module, TypeInner};
 use brickfield_shaders::{Entry, FieldKind, Variant, specialise};
@@ -51,6 +51,12 @@ fn host_and_shader_structs_have_the_same_layout() {
     #[rustfmt::skip]
     assert_equal(&decode, "PackedBrick", host!(PackedUniform, extent, n_levels, first_coefficient, first_texel, row_words, step,
         first_word, kernel, value, padding));
+    let shading = MeshShading { lit: true, has_normals: true, has_lines: true, ..MeshShading::default() };
+    let mesh = specialise(&Variant::mesh(shading)).unwrap().module;
+    #[rustfmt::skip]
+    assert_equal(&mesh, "MeshView", host!(MeshUniforms, clip_x, clip_y, clip_z, clip_w, anchor, anchor_right, anchor_down, direction,
+        direction_right, direction_down, line, source, n_knots, shininess, padding));
+    assert_equal(&mesh, "Vertex", host!(MeshVertex, position, normal));
     for fetch in Fetch::ALL {
         assert_equal(&specialise(&Variant::probe(fetch)).unwrap().module, "Probe", host!(ProbeUniforms, work));
     }

@@ -138,6 +138,10 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
             }
             Entry::Probe(_) => assert!(uses(Resource::Means)),
             Entry::Decode => assert!(uses(Resource::PackedWords) && shader.n_storage_buffers() == 4),
+            Entry::Mesh(_) => {
+                let expected = [Resource::MeshView, Resource::Vertices, Resource::Triangles, Resource::Colors];
+                assert_eq!(resources(&shader), expected);
+            }
             Entry::Evaluate(_) => {
                 let outputs = |b: &&brickfield_shaders::Binding| b.resource == Resource::Outputs;
                 let outputs = shader.bindings.iter().find(outputs).unwrap();

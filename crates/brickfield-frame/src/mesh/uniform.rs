@@ -11,8 +11,14 @@ use super::MeshPlan;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct MeshUniforms {
-    /// The rows of the matrix from positions to the clip space of WebGPU: x, y, z (1 at the nearest, 0 at infinity or at the farthest), w.
-    pub clip: [[f32; 4]; 4],
+    /// From a position to x in the clip space of WebGPU.
+    pub clip_x: [f32; 4],
+    /// To y.
+    pub clip_y: [f32; 4],
+    /// To z: 1 at the nearest, 0 at infinity or at the farthest.
+    pub clip_z: [f32; 4],
+    /// To w.
+    pub clip_w: [f32; 4],
     /// Anchor of the picture's centre; and the depth of the anchors' plane.
     pub anchor: [f32; 4],
     /// Change of the anchor a pixel to the right; half the picture's width.
@@ -46,10 +52,14 @@ impl MeshUniforms {
     pub fn of(plan: &MeshPlan) -> MeshUniforms {
         let rays = &plan.rays;
         let half = 0.5 * rays.size.as_dvec2();
+        let [clip_x, clip_y, clip_z, clip_w] = clip(plan);
         let (light, line) = (plan.light.as_ref(), plan.lines.as_ref());
         let terms = light.map(|light| light.terms()).unwrap_or_default();
         MeshUniforms {
-            clip: clip(plan),
+            clip_x,
+            clip_y,
+            clip_z,
+            clip_w,
             anchor: row(rays.anchor[0], rays.anchor_depth),
             anchor_right: row(rays.anchor[1], half.x),
             anchor_down: row(rays.anchor[2], half.y),
