@@ -18,7 +18,7 @@ use crate::resources::{Brought, Resources, missing};
 use crate::staging::Staging;
 use crate::stored_pipelines::StoredPipelines;
 use crate::vulkan::{
-    Bindable, Canvas, Device, Instance, PhysicalDevice, Pipeline, Queue, Use, VulkanImage, physical_devices,
+    Bindable, Canvas, CanvasKind, Device, Instance, PhysicalDevice, Pipeline, Queue, Use, VulkanImage, physical_devices,
 };
 use crate::{ConnectError, Options, PipelineFile, SaveError, ValidationLog};
 
@@ -30,7 +30,7 @@ pub struct AshBackend {
     pub(crate) resources: Resources,
     pub(crate) staging: Staging,
     picture: Option<VulkanImage>,
-    canvas: Option<Canvas>,
+    pub(crate) canvas: Option<Canvas>,
     polygons: Polygons,
     description: Description,
     /// After the pipelines, so that those of other threads are in it.
@@ -96,6 +96,14 @@ impl AshBackend {
         self.device.instance().log().clone()
     }
 
+    pub(crate) fn check_size(&self, size: UVec2) -> Result<(), RenderError> {
+        let limit = self.description.capabilities.max_image;
+        match size.max_element() > limit {
+            true => Err(RenderError::ImageTooLarge { size, limit }),
+            false => Ok(()),
+        }
+    }
+
     /// Draws a batch, over those before it.
     fn draw(&mut self, plan: &FramePlan, is_first: bool) -> Result<Cost, RenderError> {
         let started = Instant::now();
@@ -143,7 +151,7 @@ impl AshBackend {
         is_first: bool,
         (chosen, started): (Chosen, Instant),
     ) -> Result<(Timing, u64), RenderError> {
-        let canvas = reserve_canvas(&mut self.canvas, &self.device, proxy.target(), plan.size())?;
+        let canvas = reserve_canvas(&mut self.canvas, &self.device, CanvasKind::Polygons(proxy.target()), plan.size())?;
         let pipeline = (&mut self.pipelines, chosen.key);
         let brought = self.resources.bring(&mut self.queue, &mut self.staging, plan, pipeline)?;
         let of_polygons = self.polygons.bring(&self.device, &mut self.queue, &mut self.staging, proxy)?;
@@ -199,10 +207,7 @@ impl Backend for AshBackend {
         size: UVec2,
         batches: &mut dyn Iterator<Item = FramePlan>,
     ) -> Result<Frame, RenderError> {
-        let limit = self.description.capabilities.max_image;
-        if size.max_element() > limit {
-            return Err(RenderError::ImageTooLarge { size, limit });
-        }
+        self.check_size(size)?;
         check_memory(size)?;
         let mut drawn = Drawn::Rays;
         let cost = draw_batches(size, batches, |plan, is_first| {

@@ -5,6 +5,7 @@ mod decode;
 mod error;
 mod evaluate;
 mod march;
+mod mesh;
 mod options;
 mod polygons;
 mod probe;

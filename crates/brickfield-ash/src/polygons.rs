@@ -5,12 +5,12 @@ use std::time::Instant;
 
 use ash::vk;
 use brickfield_core::glam::UVec2;
-use brickfield_frame::{ContentId, ProxyGeometry, RenderError, Target};
+use brickfield_frame::{ContentId, ProxyGeometry, RenderError};
 
 use crate::march::{RenderTime, milliseconds_since};
 use crate::resources::Reused;
 use crate::staging::{Staging, Write};
-use crate::vulkan::{BoundPipeline, Canvas, Device, Queue, Triangles, Use};
+use crate::vulkan::{BoundPipeline, Canvas, CanvasKind, Device, Queue, Triangles, Use};
 
 /// The polygons on the device.
 pub(crate) struct Polygons {
@@ -93,12 +93,12 @@ impl Polygons {
 pub(crate) fn reserve_canvas<'a>(
     slot: &'a mut Option<Canvas>,
     device: &Arc<Device>,
-    target: Target,
+    kind: CanvasKind,
     size: UVec2,
 ) -> Result<&'a Canvas, RenderError> {
-    slot.take_if(|canvas| !canvas.fits(target, size));
+    slot.take_if(|canvas| !canvas.fits(kind, size));
     match slot {
         Some(canvas) => Ok(canvas),
-        none => Ok(none.insert(Canvas::new(device, target, size)?)),
+        none => Ok(none.insert(Canvas::new(device, kind, size)?)),
     }
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use ash::vk;
 use brickfield_core::BrickSide;
 use brickfield_frame::{
-    AtlasShape, Chunked, Content, FramePlan, FrameUniforms, HeldChunks, RenderError, Resource, Slots,
+    AtlasShape, Chunked, Content, FramePlan, FrameUniforms, HeldChunks, MeshPlan, RenderError, Resource, Slots,
 };
 use brickfield_shaders::{Binding, BindingKind, PipelineKey, Pipelines, decodings};
 
@@ -70,7 +70,7 @@ impl Resources {
 
     fn entry(&mut self, resource: Resource) -> &mut Reused {
         let usage = match resource {
-            Resource::Frame | Resource::Decoding => vk::BufferUsageFlags::UNIFORM_BUFFER,
+            Resource::Frame | Resource::Decoding | Resource::MeshView => vk::BufferUsageFlags::UNIFORM_BUFFER,
             _ => vk::BufferUsageFlags::STORAGE_BUFFER,
         };
         self.buffers.entry(resource).or_insert_with(|| Reused::new(resource.name(), usage))
@@ -108,17 +108,49 @@ impl Resources {
         if bindings.iter().any(|b| b.resource == Resource::Frame) {
             numbers.push((Resource::Frame, Cow::Borrowed(bytemuck::bytes_of(&uniforms))));
         }
-        for (resource, bytes) in &numbers {
+        n_bytes += self.bring_buffers(queue, staging, &numbers, &lists)?;
+        Ok(Brought { uniforms, n_bytes })
+    }
+
+    /// As [`bring`](Self::bring), of a mesh; the bytes that were brought.
+    pub(crate) fn bring_mesh(
+        &mut self,
+        queue: &mut Queue,
+        staging: &mut Staging,
+        plan: &MeshPlan,
+        bindings: &[Binding],
+    ) -> Result<u64, RenderError> {
+        let (mut numbers, mut lists) = (Vec::new(), Vec::new());
+        for Binding { resource, .. } in bindings {
+            match plan.content(*resource) {
+                Some(Content::Bytes(bytes)) => numbers.push((*resource, bytes)),
+                Some(Content::Chunks(chunks)) => lists.push((*resource, chunks)),
+                Some(Content::Texture(_)) | None => return Err(missing(*resource)),
+            }
+        }
+        self.bring_buffers(queue, staging, &numbers, &lists)
+    }
+
+    /// Brings numbers, and the chunks of lists that the device lacks, in one submit.
+    fn bring_buffers(
+        &mut self,
+        queue: &mut Queue,
+        staging: &mut Staging,
+        numbers: &[(Resource, Cow<'_, [u8]>)],
+        lists: &[(Resource, &dyn Chunked)],
+    ) -> Result<u64, RenderError> {
+        let device = self.device.clone();
+        for (resource, bytes) in numbers {
             self.entry(*resource).reserve(&device, bytes.len())?;
         }
-        for (resource, chunks) in &lists {
+        for (resource, chunks) in lists {
             self.entry(*resource).make_room(&device, queue, *chunks)?;
         }
-        n_bytes += self.fill(queue, staging, &numbers, &lists)?;
+        let n_bytes = self.fill(queue, staging, numbers, lists)?;
         for (resource, chunks) in lists {
-            self.entry(resource).held.hold(chunks);
+            self.entry(*resource).held.hold(*chunks);
         }
-        Ok(Brought { uniforms, n_bytes })
+        Ok(n_bytes)
     }
 
     /// Brings the slots that a texture lacks; the bytes that were brought.

@@ -31,9 +31,9 @@ pub struct WgpuBackend {
     pub(crate) device: Arc<Device>,
     pub(crate) pipelines: Pipelines<Pipeline>,
     pub(crate) clock: Option<Clock>,
-    resources: Resources,
+    pub(crate) resources: Resources,
     polygons: Polygons,
-    staging: Reused,
+    pub(crate) staging: Reused,
     outputs: Outputs,
 }
 
@@ -75,7 +75,7 @@ impl WgpuBackend {
         self.resources.forget_textures();
     }
 
-    fn check_size(&self, size: UVec2) -> Result<(), RenderError> {
+    pub(crate) fn check_size(&self, size: UVec2) -> Result<(), RenderError> {
         let limit = self.device.description.capabilities.max_image;
         if size.max_element() > limit {
             return Err(RenderError::ImageTooLarge { size, limit });
@@ -259,7 +259,7 @@ pub(crate) fn dispatch(
 ) -> Result<(), RenderError> {
     let bound = resources.bind(device, pipeline)?;
     let Program::Compute(program) = &pipeline.program else {
-        return Err(RenderError::Unsupported { what: "compute with a shader of polygons" });
+        return Err(RenderError::Unsupported { what: "compute with a shader that draws" });
     };
     device.checked("running a shader", 0, || {
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());

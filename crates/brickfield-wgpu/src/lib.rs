@@ -6,6 +6,7 @@ mod buffer;
 mod clock;
 mod decode;
 mod device;
+mod mesh;
 mod picture;
 mod pipeline;
 mod polygons;

@@ -8,13 +8,15 @@ use wgpu::BufferUsages;
 use crate::buffer::Reused;
 use crate::device::Device;
 
-/// The two ways of making a picture.
+/// The ways of making a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Maker {
     /// A shader that stores its pixels.
     Rays,
     /// Polygons that are blended into it.
     Polygons(Target),
+    /// The triangles of a mesh, the nearest of each pixel.
+    Mesh,
 }
 
 /// A picture of some size.
@@ -23,12 +25,14 @@ pub(crate) struct Picture {
     maker: Maker,
     texture: wgpu::Texture,
     pub(crate) view: wgpu::TextureView,
+    /// The depths of a mesh's picture.
+    pub(crate) depth: Option<wgpu::TextureView>,
 }
 
 impl Maker {
     fn target(self) -> Target {
         match self {
-            Maker::Rays => Target::Float32,
+            Maker::Rays | Maker::Mesh => Target::Float32,
             Maker::Polygons(target) => target,
         }
     }
@@ -36,7 +40,7 @@ impl Maker {
     fn usage(self) -> wgpu::TextureUsages {
         match self {
             Maker::Rays => wgpu::TextureUsages::STORAGE_BINDING,
-            Maker::Polygons(_) => wgpu::TextureUsages::RENDER_ATTACHMENT,
+            Maker::Polygons(_) | Maker::Mesh => wgpu::TextureUsages::RENDER_ATTACHMENT,
         }
     }
 }
@@ -64,7 +68,8 @@ impl Picture {
                 view_formats: &[],
             });
             let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-            Picture { size, maker, texture, view }
+            let depth = (maker == Maker::Mesh).then(|| depth(device, size));
+            Picture { size, maker, texture, view, depth }
         })
     }
 
@@ -97,6 +102,23 @@ impl Picture {
         buffer.unmap();
         Ok(image)
     }
+}
+
+/// The texels of depths.
+pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+fn depth(device: &Device, size: UVec2) -> wgpu::TextureView {
+    let texture = device.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("depth"),
+        size: extent(size),
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: DEPTH,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+        view_formats: &[],
+    });
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
 /// The buffer through which a picture comes back.

@@ -7,7 +7,7 @@ use brickfield_frame::{ProxyCorner, RenderError, Resource, Target};
 use brickfield_shaders::{Binding, BindingKind, Entry, PipelineKey, Pipelines, ShaderLibrary, Specialised};
 
 use crate::device::Device;
-use crate::picture::format;
+use crate::picture::{DEPTH, format};
 
 /// A variant, ready to run.
 pub(crate) struct Pipeline {
@@ -21,6 +21,7 @@ pub(crate) struct Pipeline {
 pub(crate) enum Program {
     Compute(wgpu::ComputePipeline),
     Polygons(wgpu::RenderPipeline),
+    Mesh(wgpu::RenderPipeline),
 }
 
 /// The pipelines of a device, none yet.
@@ -60,6 +61,7 @@ fn from_shader(device: &wgpu::Device, shader: Specialised, target: Target) -> Pi
     });
     let program = match entry {
         Entry::Proxy(_) => Program::Polygons(polygons(device, &pipeline_layout, &module, (entry, target))),
+        Entry::Mesh(_) => Program::Mesh(mesh(device, &pipeline_layout, &module, entry)),
         Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => {
             Program::Compute(compute(device, &pipeline_layout, &module, label))
         }
@@ -122,6 +124,44 @@ fn polygons(
     })
 }
 
+/// Triangles seen from both sides, whose corners the shader finds by their numbers; of each pixel the nearest stays.
+fn mesh(
+    device: &wgpu::Device,
+    layout: &wgpu::PipelineLayout,
+    module: &wgpu::ShaderModule,
+    entry: Entry,
+) -> wgpu::RenderPipeline {
+    let [vertex, fragment] = [0, 1].map(|i| Some(entry.entry_points()[i]));
+    let compilation_options = wgpu::PipelineCompilationOptions::default;
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("mesh"),
+        layout: Some(layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: vertex,
+            compilation_options: compilation_options(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Greater),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: fragment,
+            compilation_options: compilation_options(),
+            targets: &[Some(format(Target::Float32).into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
 fn layout_entry(binding: &Binding, entry: Entry, filtered: bool) -> wgpu::BindGroupLayoutEntry {
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
@@ -142,7 +182,7 @@ fn layout_entry(binding: &Binding, entry: Entry, filtered: bool) -> wgpu::BindGr
         },
     };
     let visibility = match entry {
-        Entry::Proxy(_) => wgpu::ShaderStages::VERTEX_FRAGMENT,
+        Entry::Proxy(_) | Entry::Mesh(_) => wgpu::ShaderStages::VERTEX_FRAGMENT,
         Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => wgpu::ShaderStages::COMPUTE,
     };
     wgpu::BindGroupLayoutEntry { binding: binding.index, visibility, ty, count: None }

@@ -124,7 +124,7 @@ fn read(
     clock: Option<&Clock>,
 ) -> Result<(), RenderError> {
     let Program::Compute(program) = &pipeline.program else {
-        return Err(RenderError::Unsupported { what: "compute with a shader of polygons" });
+        return Err(RenderError::Unsupported { what: "compute with a shader that draws" });
     };
     let [x, y, _] = pipeline.workgroup_size;
     device.checked("reading textures", 0, || {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use brickfield_core::BrickSide;
 use brickfield_core::glam::UVec2;
-use brickfield_frame::{AtlasShape, Content, FramePlan, FrameUniforms, RenderError, Resource, Slots};
+use brickfield_frame::{AtlasShape, Content, FramePlan, FrameUniforms, MeshPlan, RenderError, Resource, Slots};
 use brickfield_shaders::{Binding, BindingKind, decodings};
 use wgpu::BufferUsages;
 
@@ -49,7 +49,7 @@ impl Resources {
     /// The buffer of a resource.
     pub(crate) fn buffer(&mut self, resource: Resource) -> &mut Reused {
         let usage = match resource {
-            Resource::Frame | Resource::Decoding => BufferUsages::UNIFORM,
+            Resource::Frame | Resource::Decoding | Resource::MeshView => BufferUsages::UNIFORM,
             _ => BufferUsages::STORAGE,
         };
         let usage = usage | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
@@ -78,6 +78,24 @@ impl Resources {
             n_bytes += self.buffer(Resource::Frame).write(device, bytemuck::bytes_of(&uniforms))?;
         }
         Ok(Brought { uniforms, n_bytes })
+    }
+
+    /// As [`bring`](Self::bring), of a mesh; the bytes that were brought.
+    pub(crate) fn bring_mesh(
+        &mut self,
+        device: &Device,
+        plan: &MeshPlan,
+        pipeline: &Pipeline,
+    ) -> Result<u64, RenderError> {
+        let mut n_bytes = 0;
+        for Binding { resource, .. } in &pipeline.bindings {
+            n_bytes += match plan.content(*resource) {
+                Some(Content::Bytes(bytes)) => self.buffer(*resource).write(device, &bytes)?,
+                Some(Content::Chunks(chunks)) => self.buffer(*resource).bring(device, chunks)?,
+                Some(Content::Texture(_)) | None => return Err(missing(*resource)),
+            };
+        }
+        Ok(n_bytes)
     }
 
     /// Brings the slots that the device lacks; the bytes that were brought.

@@ -64,6 +64,14 @@ impl VulkanImage {
         VulkanImage::new(device, ("the picture", n_bytes), vk::ImageViewType::TYPE_2D, info, size.extend(1))
     }
 
+    /// The depths of a mesh's picture.
+    pub(crate) fn depth(device: &Arc<Device>, size: UVec2) -> Result<VulkanImage, RenderError> {
+        let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT;
+        let info = vk::ImageCreateInfo::default().image_type(vk::ImageType::TYPE_2D).format(DEPTH_FORMAT).usage(usage);
+        let n_bytes = 4 * n_texels(size.extend(1));
+        VulkanImage::new(device, ("the depths", n_bytes), vk::ImageViewType::TYPE_2D, info, size.extend(1))
+    }
+
     fn new(
         device: &Arc<Device>,
         (what, n_bytes): (&'static str, u64),
@@ -85,7 +93,7 @@ impl VulkanImage {
             .image(raw)
             .view_type(view_type)
             .format(info.format)
-            .subresource_range(WHOLE);
+            .subresource_range(vk::ImageSubresourceRange { aspect_mask: aspect(info.format), ..WHOLE });
         // SAFETY: the image is bound to memory and of this format and dimension.
         image.view = unsafe { device.raw().create_image_view(&view, None) }.of("vkCreateImageView")?;
         Ok(image)
@@ -150,6 +158,13 @@ pub(crate) fn vulkan_format(format: SampleFormat) -> vk::Format {
         SampleFormat::Unorm16 => vk::Format::R16_UNORM,
         SampleFormat::Float32 => vk::Format::R32_SFLOAT,
     }
+}
+
+/// The format of depths.
+pub(super) const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
+
+fn aspect(format: vk::Format) -> vk::ImageAspectFlags {
+    if format == DEPTH_FORMAT { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR }
 }
 
 /// The format of the image that polygons are blended into.

@@ -27,7 +27,7 @@ mod recorder;
 
 pub(crate) use adapter::{PhysicalDevice, physical_devices};
 pub(crate) use buffer::{Buffer, HostBuffer};
-pub(crate) use canvas::Canvas;
+pub(crate) use canvas::{Canvas, CanvasKind};
 pub(crate) use device::{Device, PipelineIdentity};
 pub(crate) use image::{Sampler, VulkanImage, vulkan_format};
 pub(crate) use instance::Instance;

@@ -9,7 +9,7 @@ use ash::vk;
 use brickfield_frame::{ProxyCorner, RenderError, Resource, Target};
 use brickfield_shaders::{Binding, BindingKind, Entry, Specialised};
 
-use super::canvas::RenderPass;
+use super::canvas::{CanvasKind, RenderPass};
 use super::{Buffer, Device, Sampler, VulkanImage};
 use crate::error::OfCall;
 use crate::resources::missing;
@@ -128,7 +128,7 @@ impl Pipeline {
 
     fn lay_out(&mut self) -> Result<(), RenderError> {
         let stages = match self.entry {
-            Entry::Proxy(_) => vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
+            Entry::Proxy(_) | Entry::Mesh(_) => vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
             Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => vk::ShaderStageFlags::COMPUTE,
         };
         let binding = |b: &Binding| {
@@ -172,7 +172,8 @@ impl Pipeline {
             unsafe { device.raw().create_shader_module(&vk::ShaderModuleCreateInfo::default().code(spirv), None) };
         let module = module.of("vkCreateShaderModule")?;
         let made = match self.entry {
-            Entry::Proxy(_) => self.compile_polygons(module, target),
+            Entry::Proxy(_) => self.compile_triangles(module, CanvasKind::Polygons(target)),
+            Entry::Mesh(_) => self.compile_triangles(module, CanvasKind::Mesh),
             Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => self.compile_compute(module),
         };
         // SAFETY: a pipeline does not need its module any more.
@@ -190,8 +191,9 @@ impl Pipeline {
         Ok(made.map_err(|(_, code)| code).of("vkCreateComputePipelines")?[0])
     }
 
-    /// Triangles of [`ProxyCorner`]s, seen from both sides, blended over the pixels that are there; viewport and scissor are set when drawing.
-    fn compile_polygons(&self, module: vk::ShaderModule, target: Target) -> Result<vk::Pipeline, RenderError> {
+    /// Triangles seen from both sides: of [`ProxyCorner`]s, blended over the pixels that are there; or of a mesh, whose corners the shader finds
+    /// by their numbers, and of which the nearest stays. Viewport and scissor are set when drawing.
+    fn compile_triangles(&self, module: vk::ShaderModule, kind: CanvasKind) -> Result<vk::Pipeline, RenderError> {
         let names = names(self.entry)?;
         let stages = [
             stage(vk::ShaderStageFlags::VERTEX, module, &names[0]),
@@ -199,9 +201,13 @@ impl Pipeline {
         ];
         let buffers = [vk::VertexInputBindingDescription::default().stride(size_of::<ProxyCorner>() as u32)];
         let attributes = corner_attributes();
-        let vertices = vk::PipelineVertexInputStateCreateInfo::default()
-            .vertex_binding_descriptions(&buffers)
-            .vertex_attribute_descriptions(&attributes);
+        let vertices = vk::PipelineVertexInputStateCreateInfo::default();
+        let vertices = match kind {
+            CanvasKind::Polygons(_) => {
+                vertices.vertex_binding_descriptions(&buffers).vertex_attribute_descriptions(&attributes)
+            }
+            CanvasKind::Mesh => vertices,
+        };
         let triangles =
             vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
         let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
@@ -211,11 +217,12 @@ impl Pipeline {
             .line_width(1.0);
         let samples =
             vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        let blended = [over()];
+        let blended = [if kind == CanvasKind::Mesh { instead() } else { over() }];
+        let depth = nearest();
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blended);
         let changing = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&changing);
-        let pass = RenderPass::new(&self.device, target)?;
+        let pass = RenderPass::new(&self.device, kind)?;
         let info = vk::GraphicsPipelineCreateInfo::default()
             .stages(&stages)
             .vertex_input_state(&vertices)
@@ -227,6 +234,7 @@ impl Pipeline {
             .dynamic_state(&dynamic)
             .layout(self.layout)
             .render_pass(pass.raw);
+        let info = if kind == CanvasKind::Mesh { info.depth_stencil_state(&depth) } else { info };
         // SAFETY: all objects of the description are alive; stages and layout are of one module. The render pass may go: the ones that
         // the pipeline is used in are compatible.
         let made = unsafe { self.device.raw().create_graphics_pipelines(self.device.pipelines, &[info], None) };
@@ -273,6 +281,19 @@ fn over() -> vk::PipelineColorBlendAttachmentState {
         .dst_alpha_blend_factor(rest)
         .alpha_blend_op(vk::BlendOp::ADD)
         .color_write_mask(vk::ColorComponentFlags::RGBA)
+}
+
+/// Colours instead of those that are there.
+fn instead() -> vk::PipelineColorBlendAttachmentState {
+    vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA)
+}
+
+/// Depths fall with the distance: the greater one stays.
+fn nearest() -> vk::PipelineDepthStencilStateCreateInfo<'static> {
+    vk::PipelineDepthStencilStateCreateInfo::default()
+        .depth_test_enable(true)
+        .depth_write_enable(true)
+        .depth_compare_op(vk::CompareOp::GREATER)
 }
 
 impl Drop for Pipeline {

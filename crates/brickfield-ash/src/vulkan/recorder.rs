@@ -166,34 +166,51 @@ impl<'q, 'a> Recorder<'q, 'a> {
     pub(crate) fn draw(&mut self, bound: &'a BoundPipeline<'a>, canvas: &'a Canvas, triangles: Triangles<'a>) {
         let Triangles { corners, indices, range } = triangles;
         assert!(u64::from(range.end) * 4 <= indices.n_bytes(), "a draw past the end of the triangles");
-        let (pipeline, graphics) = (bound.pipeline, vk::PipelineBindPoint::GRAPHICS);
-        let UVec3 { x: width, y: height, .. } = canvas.image.extent();
-        let area = vk::Rect2D::default().extent(vk::Extent2D { width, height });
-        // y upwards, as naga's shaders have it.
-        let viewport = vk::Viewport {
-            x: 0.0,
-            y: height as f32,
-            width: width as f32,
-            height: -(height as f32),
-            min_depth: 0.0,
-            max_depth: 1.0,
-        };
-        let pass = vk::RenderPassBeginInfo::default()
-            .render_pass(canvas.pass.raw)
-            .framebuffer(canvas.framebuffer)
-            .render_area(area);
+        let pass = canvas.begin_info();
         // SAFETY: canvas, pipeline, its set, the bound resources, and both buffers outlive the run. The pipeline was made for a pass
         // like the canvas's; indices are inside their buffer (asserted), and name corners that are there (`Polygons::hold` looks).
         unsafe {
             self.device.cmd_begin_render_pass(self.commands, &pass, vk::SubpassContents::INLINE);
-            self.device.cmd_bind_pipeline(self.commands, graphics, pipeline.raw);
-            self.device.cmd_bind_descriptor_sets(self.commands, graphics, pipeline.layout, 0, &[pipeline.set], &[]);
-            self.device.cmd_set_viewport(self.commands, 0, &[viewport]);
-            self.device.cmd_set_scissor(self.commands, 0, &[area]);
+            self.prepare_drawing(bound, canvas);
             self.device.cmd_bind_vertex_buffers(self.commands, 0, &[corners.raw], &[0]);
             self.device.cmd_bind_index_buffer(self.commands, indices.raw, 0, vk::IndexType::UINT32);
             self.device.cmd_draw_indexed(self.commands, range.end - range.start, 1, range.start, 0, 0);
             self.device.cmd_end_render_pass(self.commands);
+        }
+    }
+}
+
+impl<'a> Recorder<'_, 'a> {
+    /// Draws a mesh of so many triangles into a canvas of its kind, which is cleared before.
+    pub(crate) fn draw_mesh(&mut self, bound: &'a BoundPipeline<'a>, canvas: &'a Canvas, n_triangles: u32) {
+        let clear = [vk::ClearValue::default(); 2];
+        let pass = canvas.begin_info().clear_values(&clear);
+        // SAFETY: canvas, pipeline, its set and the bound resources outlive the run. The pipeline was made for a pass like the canvas's. The
+        // shader finds corners by their numbers, and its reads are restricted to their buffers.
+        unsafe {
+            self.device.cmd_begin_render_pass(self.commands, &pass, vk::SubpassContents::INLINE);
+            self.prepare_drawing(bound, canvas);
+            self.device.cmd_draw(self.commands, 3 * n_triangles, 1, 0, 0);
+            self.device.cmd_end_render_pass(self.commands);
+        }
+    }
+
+    /// Binds a pipeline, and draws into the whole canvas.
+    ///
+    /// # Safety
+    /// Within a render pass of the canvas.
+    unsafe fn prepare_drawing(&mut self, bound: &'a BoundPipeline<'a>, canvas: &'a Canvas) {
+        let (pipeline, graphics) = (bound.pipeline, vk::PipelineBindPoint::GRAPHICS);
+        let area = canvas.area();
+        let (width, height) = (area.extent.width as f32, area.extent.height as f32);
+        // y upwards, as naga's shaders have it.
+        let viewport = vk::Viewport { x: 0.0, y: height, width, height: -height, min_depth: 0.0, max_depth: 1.0 };
+        // SAFETY: pipeline, its set and the canvas outlive the run; viewport and scissor are those of the canvas.
+        unsafe {
+            self.device.cmd_bind_pipeline(self.commands, graphics, pipeline.raw);
+            self.device.cmd_bind_descriptor_sets(self.commands, graphics, pipeline.layout, 0, &[pipeline.set], &[]);
+            self.device.cmd_set_viewport(self.commands, 0, &[viewport]);
+            self.device.cmd_set_scissor(self.commands, 0, &[area]);
         }
     }
 }

@@ -19,12 +19,13 @@ use std::time::Instant;
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{BrickSide, Image};
 use brickfield_frame::{
-    Backend, Capabilities, Cost, Description, Evaluate, Frame, FramePlan, Join, Places, PlanRay, RenderError,
-    SampleFormat, ShaderFunction, check_memory, draw_batches,
+    Backend, Capabilities, Cost, Description, Evaluate, Frame, FramePlan, Join, MeshBackend, MeshFrame, MeshPlan,
+    Places, PlanRay, RenderError, SampleFormat, ShaderFunction, Timing, check_memory, draw_batches,
 };
 use brickfield_interp::Neighbourhood;
 use rayon::prelude::*;
 
+use crate::mesh::mesh_pixels;
 use brick::{Float32, Stored, Unorm8, Unorm16};
 use classify::{Classifier, Optics32};
 use f32_plan::F32Plan;
@@ -101,6 +102,18 @@ impl Backend for CpuBackend {
 
     fn as_evaluate(&mut self) -> Option<&mut dyn Evaluate> {
         Some(self)
+    }
+}
+
+impl MeshBackend for CpuBackend {
+    /// In f64: it is the reference itself.
+    fn render_mesh(&mut self, plan: &MeshPlan) -> Result<MeshFrame, RenderError> {
+        check(plan.size())?;
+        check_memory(plan.size())?;
+        let begin = Instant::now();
+        let pixels = mesh_pixels(plan);
+        let timing = Timing { wall_ms: milliseconds(begin), ..Timing::default() };
+        Ok(MeshFrame { pixels, timing, uploaded_bytes: 0 })
     }
 }
 
