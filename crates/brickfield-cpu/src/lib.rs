@@ -10,4 +10,4 @@ mod mesh;
 pub use continuous::{Continuous, ContinuousOptions, RayIntegral, continuous, continuous_ray};
 pub use discrete::{Discrete, discrete, filter_rounding, position_rounding};
 pub use fast::CpuBackend;
-pub use mesh::mesh_pixels;
+pub use mesh::{MeshAnswer, mesh_answer, mesh_pixels};

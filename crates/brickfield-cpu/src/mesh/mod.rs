@@ -4,6 +4,7 @@
 //! is taken for one a little further to the right, and still less further down: it meets exactly one of the triangles around a
 //! point of a closed mesh, decided without a tolerance.
 
+mod answer;
 mod bins;
 mod outline;
 mod shade;
@@ -13,6 +14,7 @@ use brickfield_core::glam::DVec2;
 use brickfield_frame::MeshPlan;
 use rayon::prelude::*;
 
+pub use answer::{MeshAnswer, mesh_answer};
 use bins::{BAND_ROWS, Bins};
 use outline::{Corners, Outline};
 use shade::{ShadedColor, Shader};
@@ -54,6 +56,13 @@ struct Rows {
 }
 
 impl Rows {
+    /// The numbers of these rows' pixels in the box around an outline.
+    fn within(self, outline: &Outline, width: u32) -> impl Iterator<Item = usize> + use<> {
+        let columns = outline.columns(0, width);
+        let row = move |y: u32| columns.clone().map(move |x| (x + width * (y - self.first)) as usize);
+        outline.rows(self.first, self.first + self.n).flat_map(row)
+    }
+
     /// The centre of a pixel, by its number in these rows.
     fn center(self, i: usize, width: usize) -> DVec2 {
         DVec2::new((i % width) as f64 + 0.5, f64::from(self.first) + (i / width) as f64 + 0.5)
@@ -82,14 +91,12 @@ impl Hit {
 fn draw(plan: &MeshPlan, corners: &Corners, rows: Rows, hit: &mut dyn FnMut(usize, Hit)) {
     let Some(outline) = Outline::of(plan, corners) else { return };
     let width = plan.size().x;
-    for y in outline.rows(rows.first, rows.first + rows.n) {
-        for x in outline.columns(0, width) {
-            let at = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-            if outline.covers(at)
-                && let Some(found) = outline.meet(plan, corners, at)
-            {
-                hit((x + width * (y - rows.first)) as usize, found);
-            }
+    for pixel in rows.within(&outline, width) {
+        let at = rows.center(pixel, width as usize);
+        if outline.covers(at)
+            && let Some(found) = outline.meet(plan, corners, at)
+        {
+            hit(pixel, found);
         }
     }
 }

@@ -123,6 +123,14 @@ impl Outline {
         self.edges.iter().map(inside).fold(f64::INFINITY, f64::min)
     }
 
+    /// Where the ray of a position meets the triangle's plane: its depth.
+    pub(super) fn depth_in_plane(&self, plan: &MeshPlan, corners: &Corners, position: DVec2) -> f64 {
+        let volumes = self.edges.map(|edge| edge.at(position));
+        let sum: f64 = volumes.iter().sum();
+        let point: DVec3 = corners.positions.iter().zip(volumes).map(|(p, v)| *p * (v / sum)).sum();
+        plan.rays().camera(point).z
+    }
+
     /// Where the ray of a position meets the triangle, or its nearest point in the picture; `None` before the nearest depth that is drawn.
     pub(super) fn meet(&self, plan: &MeshPlan, corners: &Corners, position: DVec2) -> Option<Hit> {
         let volumes = self.edges.map(|edge| edge.at(position).max(0.0));

@@ -5,6 +5,7 @@ use brickfield_core::{LinearRgb, TransferFunction};
 use brickfield_frame::{Coloring, MeshPlan};
 use brickfield_optics::Light;
 
+use super::answer::value_rounding;
 use super::outline::{Corners, edge_lines};
 
 /// Shades the points of a plan's mesh.
@@ -12,12 +13,11 @@ pub(super) struct Shader<'a> {
     plan: &'a MeshPlan,
 }
 
-/// A colour, and how much an error of the value may change it.
+/// A colour, and how much the rounding of the value in f32 may change it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ShadedColor {
     pub(super) color: LinearRgb,
-    /// The steepest change of a channel with the value, around the value.
-    pub(super) per_value: f64,
+    pub(super) rounding: f64,
 }
 
 impl<'a> Shader<'a> {
@@ -38,11 +38,13 @@ impl<'a> Shader<'a> {
             }
         };
         let color = self.plan.light().map_or(color, |light| self.lit(light, corners, position, weights, color));
-        let per_value = match self.plan.coloring() {
-            Coloring::Values => steepness(colors, value),
+        let rounding = value_rounding(values);
+        let rounding = match self.plan.coloring() {
+            Coloring::Values => change_around(colors, value, rounding),
+            // Corners' values are known exactly, and a jump among them is not one of their values.
             Coloring::Gouraud => 0.0,
         };
-        ShadedColor { color: self.with_lines(corners, position, color), per_value }
+        ShadedColor { color: self.with_lines(corners, position, color), rounding }
     }
 
     /// The colour in the light that falls on the side of the eye.
@@ -86,14 +88,12 @@ fn mixed(of_corners: [f64; 3], weights: [f64; 3]) -> f64 {
     of_corners.iter().zip(weights).map(|(v, w)| v * w).sum()
 }
 
-/// The steepest change of a colour channel with the value in the two pieces of a colour map nearest to a value; infinite at a jump.
-fn steepness(colors: &TransferFunction, value: f64) -> f64 {
+/// The greatest change of a colour channel while the value changes by so much, jumps included.
+fn change_around(colors: &TransferFunction, value: f64, by: f64) -> f64 {
+    let own = colors.at(value).color;
+    let differs = |other: LinearRgb| (0..3).map(|c| (other[c] - own[c]).abs()).fold(0.0, f64::max);
+    let ends = [colors.at(value - by).color, colors.at(value + by).color];
     let knots = colors.knots();
-    let above = knots.partition_point(|knot| knot.value <= value);
-    let pieces = knots.windows(2).skip(above.saturating_sub(2)).take(3);
-    let slope = |pair: &[brickfield_core::Knot]| {
-        let change = (0..3).map(|c| (pair[1].color[c] - pair[0].color[c]).abs()).fold(0.0, f64::max);
-        if change == 0.0 { 0.0 } else { change / (pair[1].value - pair[0].value) }
-    };
-    pieces.map(slope).fold(0.0, f64::max)
+    let within = knots.partition_point(|k| k.value < value - by)..knots.partition_point(|k| k.value <= value + by);
+    ends.into_iter().chain(knots[within].iter().map(|k| k.color)).map(differs).fold(0.0, f64::max)
 }

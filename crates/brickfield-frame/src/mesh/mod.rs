@@ -140,6 +140,17 @@ impl MeshPlan {
         self.near
     }
 
+    /// No vertex is farther from the eye.
+    pub fn reach(&self) -> f64 {
+        self.rays.eye().length() + self.mesh.radius()
+    }
+
+    /// The same plan with other rays (a mutant in conformance runs has some).
+    #[must_use]
+    pub fn with_rays(self, rays: ViewRays) -> MeshPlan {
+        MeshPlan { rays, ..self }
+    }
+
     /// Width and height of the picture, in pixels.
     pub fn size(&self) -> UVec2 {
         self.rays.size
