@@ -14,6 +14,7 @@ mod residency;
 mod scene;
 #[cfg(feature = "formats")]
 mod store;
+mod surface;
 mod trimmed;
 mod viewpoint;
 mod visibility;
@@ -34,6 +35,7 @@ pub use blocks::{BlockStyle, Classification, PrepareBlocksError, TransparentBloc
 pub use brickfield_bricks as bricks;
 pub use brickfield_core as core;
 pub use brickfield_cpu as cpu;
+pub use brickfield_curvilinear as curvilinear;
 #[cfg(feature = "fetch")]
 pub use brickfield_fetch as fetch;
 pub use brickfield_frame as frame;
@@ -52,5 +54,6 @@ pub use residency::{Copied, Residency};
 pub use scene::{Quality, Scene, Skipping, Technique};
 #[cfg(feature = "formats")]
 pub use store::{StoreBlocks, StoreLimits, SummaryProgress};
+pub use surface::{SurfaceError, SurfaceNormals, mesh_of, surface_mesh};
 pub use trimmed::{PrepareTrimmedError, TrimResidency, TrimmedVolume, Trimming, prepare_trimmed};
 pub use viewpoint::{Viewpoint, ViewpointError};

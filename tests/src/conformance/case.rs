@@ -11,6 +11,8 @@ use brickfield::{
 };
 use brickfield_core::{Level, Volume};
 
+use super::mesh_mutants::MeshMutant;
+use super::meshes::MeshTest;
 use super::plan_mutants::PlanMutant;
 use super::shader_mutants::ShaderMutant;
 use super::storage::Storage;
@@ -29,6 +31,8 @@ pub struct Case {
 pub enum Check {
     /// Renders a scene.
     Picture(Box<dyn Fn() -> Result<PictureTest, NoData> + Send + Sync>),
+    /// Draws a mesh.
+    Mesh(Box<dyn Fn() -> MeshTest + Send + Sync>),
     /// Evaluates one function on a list of inputs.
     Function(Box<dyn Fn() -> FunctionTest + Send + Sync>),
 }
@@ -38,6 +42,8 @@ pub enum Check {
 pub enum Mutant {
     /// In the plan that it is handed.
     Plan(PlanMutant),
+    /// In the plan of a mesh that it is handed.
+    Mesh(MeshMutant),
     /// In the shaders that it compiles.
     Shader(ShaderMutant),
 }
@@ -190,6 +196,7 @@ impl Mutant {
     pub const fn name(&self) -> &'static str {
         match self {
             Mutant::Plan(m) => m.name(),
+            Mutant::Mesh(m) => m.name(),
             Mutant::Shader(m) => m.name,
         }
     }
@@ -197,7 +204,8 @@ impl Mutant {
     /// All mutants.
     pub fn all() -> BTreeSet<Mutant> {
         let shaders = super::shader_mutants::ALL.iter().copied().map(Mutant::Shader);
-        PlanMutant::ALL.into_iter().map(Mutant::Plan).chain(shaders).collect()
+        let meshes = MeshMutant::ALL.into_iter().map(Mutant::Mesh);
+        PlanMutant::ALL.into_iter().map(Mutant::Plan).chain(meshes).chain(shaders).collect()
     }
 }
 
@@ -210,6 +218,12 @@ impl fmt::Display for Mutant {
 impl From<PlanMutant> for Mutant {
     fn from(m: PlanMutant) -> Mutant {
         Mutant::Plan(m)
+    }
+}
+
+impl From<MeshMutant> for Mutant {
+    fn from(m: MeshMutant) -> Mutant {
+        Mutant::Mesh(m)
     }
 }
 

@@ -11,6 +11,7 @@ use brickfield_core::glam::UVec2;
 
 use super::candidate::Candidate;
 use super::case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, PictureTest, Plans, Shows};
+use super::meshes::PreparedMesh;
 use super::naive::naive;
 use super::record::RecordEntry;
 use super::rule::{Complaint, PlanTolerance, Tolerance, Verdict, bounded};
@@ -22,6 +23,7 @@ pub struct Prepared {
 
 enum CheckTask {
     Picture(Box<PreparedPicture>),
+    Mesh(Box<PreparedMesh>),
     Function(Box<FunctionTest>),
 }
 
@@ -88,6 +90,7 @@ impl Prepared {
     pub fn of(case: &Case) -> Result<Prepared, Obstacle> {
         let work = match &case.check {
             Check::Function(test) => CheckTask::Function(Box::new(test())),
+            Check::Mesh(test) => CheckTask::Mesh(Box::new(PreparedMesh::of(test())?)),
             Check::Picture(subject) => {
                 let subject = subject()?;
                 let plans = subject.plans()?;
@@ -106,6 +109,7 @@ impl Prepared {
     pub fn reference(&self) -> Option<&Image<f64>> {
         match &self.work {
             CheckTask::Picture(picture) => Some(&picture.reference.image),
+            CheckTask::Mesh(mesh) => Some(&mesh.answer.pixels),
             CheckTask::Function(_) => None,
         }
     }
@@ -116,6 +120,7 @@ impl Prepared {
         let Some(capabilities) = on.capabilities() else { return Judged::Absent };
         let run = AssertUnwindSafe(|| match &mut self.work {
             CheckTask::Function(test) => run_function(test, on, mutant),
+            CheckTask::Mesh(mesh) => mesh.run(on, mutant),
             CheckTask::Picture(picture) => run_picture(picture, &capabilities, on, mutant),
         });
         // A backend that panics fails its case, not the run.
@@ -130,6 +135,7 @@ impl Prepared {
                 let (n, size) = (plan.field().slots().n_filled(), scene.size);
                 format!("{} x {} pixels, {n} bricks, {}, {}", size.x, size.y, scene.rule.name(), scene.mode.name())
             }
+            CheckTask::Mesh(mesh) => mesh.describe(),
             CheckTask::Function(test) => format!("{} inputs", test.points.len()),
         }
     }
@@ -274,7 +280,8 @@ fn hold(test: &FunctionTest, outputs: &[[f32; 4]]) -> Result<f64, String> {
     Ok(worst)
 }
 
-fn failed(e: RenderError) -> Judged {
+/// A backend's error: that it cannot do this, or a failure.
+pub(super) fn failed(e: RenderError) -> Judged {
     match e {
         RenderError::Unsupported { .. }
         | RenderError::ImageTooLarge { .. }

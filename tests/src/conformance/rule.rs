@@ -13,6 +13,8 @@
 //! behind and of the sum, each of at most the target's unit roundoff: 2^-24, or 2^-11 for 16-bit floats, in which a device may blend.
 //! What is blended is at most 1, and what comes before only dims it: so both bounds are wider by three of them a segment.
 //!
+//! **Meshes**: the same bounds, wider by the ambiguity of the pixel: where corners and depths are rounded, another triangle may be drawn.
+//!
 //! A tolerance so wide that the picture could be anything is no test: see [`Tolerance::is_empty_promise`].
 
 use brickfield::cpu::{Discrete, filter_rounding, position_rounding};
@@ -27,6 +29,8 @@ use crate::metrics::{Errors, MetricError, errors, quantile};
 const BULK: f64 = 0.999;
 /// The narrow bound of exact mode.
 const BULK_BOUND: f64 = 1e-5;
+/// The wide bound of meshes.
+const MESH_BOUND: f64 = 1e-4;
 /// The widest bound that is a test: three quarters of a fast picture's pixels have a bound that is no wider.
 const EMPTY_PROMISE: f64 = 0.2;
 /// Longer rays have no rule: a plan has at most so many segments.
@@ -79,6 +83,8 @@ pub enum Complaint {
     NoRule { n_samples: u64 },
     #[error("a quarter of the pixels may differ by more than {bound:.2}: the tolerance promises nothing")]
     EmptyPromise { bound: f64 },
+    #[error("{n_bare} of {n_pixels} pixels show no surface, though it fills the picture: it has cracks")]
+    Cracks { n_bare: usize, n_pixels: usize },
     #[error("the picture shows {found}, but the case says {stated}")]
     Blank { found: &'static str, stated: &'static str },
     #[error("the reference differs from the volume's own sum by {difference:.3e} at pixel ({}, {}): the plan is wrong", pixel.x, pixel.y)]
@@ -123,6 +129,12 @@ impl Tolerance {
     /// As [`PlanTolerance::of`].
     pub fn of(plan: &FramePlan, reference: &Discrete, device: &Capabilities) -> Result<Tolerance, Complaint> {
         Ok(PlanTolerance::of(plan, reference)?.on(plan, reference, device.sub_texel_bits))
+    }
+
+    /// The rule for a mesh, given how far each pixel may be off.
+    pub(super) fn of_ambiguity(ambiguity: &[f64]) -> Tolerance {
+        let of = |bound: f64| ambiguity.iter().map(move |a| bound + a).collect();
+        Tolerance { most: of(MESH_BOUND), bulk: of(BULK_BOUND) }
     }
 
     /// The bound that a quarter of the pixels exceeds, if it is so wide that hardly anything could fail.

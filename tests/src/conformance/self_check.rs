@@ -75,7 +75,7 @@ impl SelfCheck {
 
     fn fate(&mut self, prepared: &mut Prepared, mutant: &Mutant, candidates: &mut [Candidate]) -> Fate {
         let judged = match mutant {
-            Mutant::Plan(_) => match candidates.iter_mut().find(|c| c.can_run(mutant)) {
+            Mutant::Plan(_) | Mutant::Mesh(_) => match candidates.iter_mut().find(|c| c.can_run(mutant)) {
                 Some(candidate) => prepared.run(candidate, Some(mutant)),
                 None => return Fate::NotRun("no backend".into()),
             },

@@ -280,6 +280,26 @@ mutants! {
     UNPACKED_STEP: "unpacked-step", "decode", "sample", "value * brick.step" => "value";
     /// Predictions are left out.
     UNPREDICTED: "unpredicted", "decode", "undo_line", "is_predicted && n_low > 1u" => "false";
+    /// Corners have each other's weights.
+    MESH_WEIGHTS_SWAPPED: "mesh-weights-swapped", "mesh", "mixed", "a * seen.weight.x + b * seen.weight.y" => "b * seen.weight.x + a * seen.weight.y";
+    /// A colour map is continuous from the left at a jump.
+    MESH_COLOR_BELOW: "mesh-color-below", "mesh", "color_of", "colors[min(below + 1u, mesh_view.n_knots - 1u)]" => "colors[below]";
+    /// The depth instead of the distance.
+    MESH_DEPTH: "mesh-depth", "mesh", "paint", "depth * length(ray.direction)" => "depth";
+    /// The normal of the first corner.
+    MESH_NORMAL_OF_CORNER: "mesh-normal-of-corner", "mesh", "normal_of", "mixed(seen, seen.a.normal, seen.b.normal, seen.c.normal).xyz"
+        => "seen.a.normal.xyz";
+    /// Normals do not turn to the eye.
+    MESH_NORMAL_AWAY: "mesh-normal-away", "mesh", "normal_of", "select(unit, -unit, dot(unit, ray.direction) > 0.0)" => "unit";
+    /// Highlights are where the surface faces the light.
+    MESH_HIGHLIGHT: "mesh-highlight", "mesh", "lit", "unit_or_nothing(to_light + to_eye)" => "to_light";
+    /// A place of light is a direction.
+    MESH_PLACE: "mesh-place", "mesh", "lit", "max(mesh_view.source.w, 0.0) * point" => "0.0 * point";
+    /// Lines along the second edge are looked for along the third.
+    MESH_LINE_EDGE: "mesh-line-edge", "mesh", "line_at", "select(1e9, pixels_from(ray, b, c), (edges & 2u) != 0u)"
+        => "select(1e9, pixels_from(ray, c, a), (edges & 2u) != 0u)";
+    /// The anchors of neighbouring pixels are taken for one.
+    MESH_LINE_SLOPE: "mesh-line-slope", "mesh", "pixels_from", "+ triple(ray, mesh_view.anchor_right.xyz, along)" => "";
     /// Opacity is the depth.
     OPACITY_IS_DEPTH: "opacity-is-depth", "march", "march", "vec4f(seen.rgb, alpha(seen.w))" => "vec4f(seen.rgb, min(seen.w, 1.0))";
 }

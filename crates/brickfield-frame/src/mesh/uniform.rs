@@ -100,7 +100,7 @@ fn clip(plan: &MeshPlan) -> [[f32; 4]; 4] {
     [x, y, row(-forward / thickness, reach / thickness), row(DVec3::ZERO, 1.0)]
 }
 
-/// A knot of the colour map as shaders read it: its value, red, green and blue.
+/// A knot of the colour map as shaders read it: red, green, blue, and its value.
 pub(crate) fn color_knots(plan: &MeshPlan) -> Vec<[f32; 4]> {
     let knot = |k: &brickfield_core::Knot| row(DVec3::from_array(k.color), k.value);
     plan.colors.knots().iter().map(knot).collect()

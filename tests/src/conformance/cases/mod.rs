@@ -5,8 +5,10 @@ mod extremes;
 mod fast;
 mod fields;
 mod functions;
+mod grids;
 mod levels;
 mod light;
+mod meshes;
 mod pictures;
 mod placements;
 mod polygons;
@@ -34,6 +36,7 @@ pub fn all() -> Vec<Case> {
         light::cases(),
         prefiltered::cases(),
         trimmed::cases(),
+        meshes::cases(),
         extremes::cases(),
         real::cases(),
     ]

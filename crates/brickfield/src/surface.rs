@@ -1,0 +1,121 @@
+//! Surfaces: selections of a curvilinear grid as meshes that backends draw (Wynn, Barnes, Hamann and Miller 1999).
+//!
+//! ```text
+//! StructuredGrid --CurvilinearGrid--> QuadTree --SizeSelector, BudgetSelector--> Selection
+//!                                                                                    |  surface_mesh: triangles, patched
+//!     MeshFrame <--render_mesh-- MeshPlan <--camera, colours, light, lines-- Mesh <--+
+//! ```
+
+use brickfield_core::glam::DVec3;
+use brickfield_curvilinear::{CurvilinearGrid, Node, OtherGrid, Selection, SurrogateMesh, surrogate_mesh};
+use brickfield_frame::{Mesh, MeshError, MeshTriangle};
+use rayon::prelude::*;
+
+/// The normals of a surface's vertices.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum SurfaceNormals {
+    /// Those of the triangles: each is a plane.
+    #[default]
+    Triangles,
+    /// Those of the grid at the vertices' nodes, from differences to the next nodes: a coarse surface is lit as a fine one.
+    Grid,
+}
+
+/// Why a selection is no mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum SurfaceError {
+    #[error(transparent)]
+    OtherGrid(#[from] OtherGrid),
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+}
+
+/// The mesh of a selection: zones as triangles without cracks, whose outlines are marked as lines.
+///
+/// # Errors
+/// A selection of another grid; more triangles than a mesh may have.
+pub fn surface_mesh(
+    grid: &CurvilinearGrid,
+    selection: &Selection,
+    normals: SurfaceNormals,
+) -> Result<Mesh, SurfaceError> {
+    Ok(mesh_of(grid, &surrogate_mesh(grid, selection)?, normals)?)
+}
+
+/// The mesh of triangles of a grid.
+///
+/// # Errors
+/// More triangles than a mesh may have.
+pub fn mesh_of(grid: &CurvilinearGrid, surrogate: &SurrogateMesh, normals: SurfaceNormals) -> Result<Mesh, MeshError> {
+    let triangle = |corners: &[u32; 3]| MeshTriangle { corners: *corners, edges: outline(surrogate, *corners) };
+    let triangles = surrogate.triangles.par_iter().map(triangle).collect();
+    let normals: Option<Vec<DVec3>> = match normals {
+        SurfaceNormals::Triangles => None,
+        SurfaceNormals::Grid => Some(surrogate.nodes.par_iter().map(|node| normal(grid, *node)).collect()),
+    };
+    Mesh::new(&surrogate.positions, &surrogate.values, normals.as_deref(), triangles)
+}
+
+/// The edges of a triangle that are parts of its zone's outline: only those stay within a row or a column of nodes.
+fn outline(surrogate: &SurrogateMesh, corners: [u32; 3]) -> u32 {
+    let node = |i: usize| surrogate.nodes[corners[i % 3] as usize];
+    let is_outline = |i: &usize| node(*i).row == node(i + 1).row || node(*i).column == node(i + 1).column;
+    (0..3).filter(is_outline).map(|i| 1 << i).sum()
+}
+
+/// The normal of a grid at a node, of length 1: across the differences along its row and its column, or 0 where there are none. A hole is not
+/// looked at.
+fn normal(grid: &CurvilinearGrid, node: Node) -> DVec3 {
+    let along = |rows: i64, columns: i64| {
+        let near = |sign: i64| {
+            let at = grid.moved(node, sign * rows, sign * columns)?;
+            (!grid.value(at).is_nan()).then(|| grid.position(at))
+        };
+        let own = grid.position(node);
+        near(1).unwrap_or(own) - near(-1).unwrap_or(own)
+    };
+    along(0, 1).cross(along(1, 0)).normalize_or_zero()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use brickfield_core::Level;
+    use brickfield_curvilinear::{HeightField, Positions, QuadTree, Zone};
+
+    use super::*;
+
+    fn slope() -> CurvilinearGrid {
+        let field =
+            HeightField { origin: DVec3::ZERO, along_column: DVec3::X, along_row: DVec3::Y, along_value: DVec3::Z };
+        let values = (0..25).map(|i| (i % 5) as f32).collect();
+        CurvilinearGrid::new(4, 4, Positions::Heights(field), values).unwrap()
+    }
+
+    #[test]
+    fn outlines_are_marked_and_diagonals_are_not() {
+        let tree = Arc::new(QuadTree::build(slope()));
+        let zone = |level, row, column| Zone { level: Level(level), row, column };
+        let leaves =
+            [zone(1, 0, 0), zone(1, 0, 1), zone(1, 1, 0), zone(0, 2, 2), zone(0, 2, 3), zone(0, 3, 2), zone(0, 3, 3)];
+        let selection = Selection::of_leaves(&tree, leaves).unwrap();
+        let mesh = surface_mesh(tree.grid(), &selection, SurfaceNormals::Grid).unwrap();
+        // Seven zones with four sides each; two coarse ones have a side in two pieces.
+        let n_sides: u32 = mesh.triangles().iter().map(|t| t.edges.count_ones()).sum();
+        assert_eq!((n_sides, mesh.triangles().len()), (4 * 7 + 2, 2 * 7 + 2));
+    }
+
+    #[test]
+    fn normals_of_the_grid_are_those_of_the_slope() {
+        let tree = Arc::new(QuadTree::build(slope()));
+        let selection = Selection::of_leaves(&tree, [tree.layout().root()]).unwrap();
+        let mesh = surface_mesh(tree.grid(), &selection, SurfaceNormals::Grid).unwrap();
+        let expected = DVec3::new(-1.0, 0.0, 1.0).normalize().as_vec3().to_array();
+        assert!(mesh.vertices().iter().all(|v| v.normal == expected), "{:?}", mesh.vertices());
+        assert!(mesh.has_normals());
+        assert!(!surface_mesh(tree.grid(), &selection, SurfaceNormals::Triangles).unwrap().has_normals());
+    }
+}

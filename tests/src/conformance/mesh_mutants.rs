@@ -1,0 +1,171 @@
+//! Plans of meshes with one thing wrong.
+
+use std::sync::Arc;
+
+use brickfield::curvilinear::{Node, SurrogateMesh};
+use brickfield::frame::{Coloring, Mesh, MeshLines, MeshPlan, MeshTriangle, MeshView};
+use brickfield_core::glam::DVec3;
+use brickfield_optics::{Light, LightSource};
+
+use super::meshes::PreparedMesh;
+
+/// One thing wrong with the plan of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum MeshMutant {
+    /// Vertices of finer zones stay at their nodes: the first patching pass is skipped.
+    NotConstrained,
+    /// Coarse zones do not take up the vertices on their edges: the second patching pass is skipped.
+    NotStitched,
+    /// A triangle in the middle is missing.
+    TriangleMissing,
+    /// Rays pass the pixels' corners, not their centres.
+    PixelCorner,
+    /// The picture is upside down.
+    RowsFlipped,
+    /// Values are 2 % of their range too high.
+    ValuesOffset,
+    /// Colours are interpolated instead of values, or values instead of colours.
+    OtherColoring,
+    /// The light comes from the other side.
+    LightTurned,
+    /// Lines are half a pixel too wide.
+    WideLines,
+    /// Lines are along other edges.
+    EdgesRotated,
+    /// Vertices are rounded to 1/1024 of the mesh.
+    CoarsePositions,
+}
+
+impl MeshMutant {
+    /// All of them.
+    pub const ALL: [MeshMutant; 11] = [
+        MeshMutant::NotConstrained,
+        MeshMutant::NotStitched,
+        MeshMutant::TriangleMissing,
+        MeshMutant::PixelCorner,
+        MeshMutant::RowsFlipped,
+        MeshMutant::ValuesOffset,
+        MeshMutant::OtherColoring,
+        MeshMutant::LightTurned,
+        MeshMutant::WideLines,
+        MeshMutant::EdgesRotated,
+        MeshMutant::CoarsePositions,
+    ];
+
+    /// The mutant's name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            MeshMutant::NotConstrained => "mesh/not-constrained",
+            MeshMutant::NotStitched => "mesh/not-stitched",
+            MeshMutant::TriangleMissing => "mesh/triangle-missing",
+            MeshMutant::PixelCorner => "mesh/pixel-corner",
+            MeshMutant::RowsFlipped => "mesh/rows-flipped",
+            MeshMutant::ValuesOffset => "mesh/values-offset",
+            MeshMutant::OtherColoring => "mesh/other-coloring",
+            MeshMutant::LightTurned => "mesh/light-turned",
+            MeshMutant::WideLines => "mesh/wide-lines",
+            MeshMutant::EdgesRotated => "mesh/edges-rotated",
+            MeshMutant::CoarsePositions => "mesh/coarse-positions",
+        }
+    }
+
+    /// The plan with this thing wrong.
+    pub(super) fn apply(self, honest: &PreparedMesh) -> MeshPlan {
+        let PreparedMesh { test, surrogate, plan, .. } = honest;
+        let view = test.view.clone();
+        match self {
+            MeshMutant::NotConstrained => test.plan(&unconstrained(honest), view),
+            MeshMutant::NotStitched => test.plan(&unstitched(honest), view),
+            MeshMutant::TriangleMissing => {
+                let mut surrogate = surrogate.clone();
+                surrogate.triangles.remove(surrogate.triangles.len() / 2);
+                test.plan(&surrogate, view)
+            }
+            MeshMutant::PixelCorner => {
+                let mut rays = *plan.rays();
+                rays.anchor[0] -= 0.5 * (rays.anchor[1] + rays.anchor[2]);
+                rays.direction[0] -= 0.5 * (rays.direction[1] + rays.direction[2]);
+                plan.clone().with_rays(rays)
+            }
+            MeshMutant::RowsFlipped => {
+                let mut rays = *plan.rays();
+                (rays.anchor[2], rays.direction[2], rays.pixel[1]) =
+                    (-rays.anchor[2], -rays.direction[2], -rays.pixel[1]);
+                plan.clone().with_rays(rays)
+            }
+            MeshMutant::ValuesOffset => {
+                let range = |pick: fn(f32, f32) -> f32, start| surrogate.values.iter().copied().fold(start, pick);
+                let by = 0.02 * (range(f32::max, f32::MIN) - range(f32::min, f32::MAX));
+                let values = surrogate.values.iter().map(|v| v + by).collect();
+                test.plan(&SurrogateMesh { values, ..surrogate.clone() }, view)
+            }
+            MeshMutant::OtherColoring => {
+                let coloring = match view.coloring {
+                    Coloring::Values => Coloring::Gouraud,
+                    Coloring::Gouraud => Coloring::Values,
+                };
+                test.plan(surrogate, MeshView { coloring, ..view })
+            }
+            MeshMutant::LightTurned => test.plan(surrogate, MeshView { light: view.light.map(turned), ..view }),
+            MeshMutant::WideLines => {
+                let lines = view.lines.map(|lines| MeshLines { width: lines.width + 0.5, ..lines });
+                test.plan(surrogate, MeshView { lines, ..view })
+            }
+            MeshMutant::EdgesRotated => {
+                with_triangles(plan, view, |t| MeshTriangle { edges: (t.edges << 1 | t.edges >> 2) & 7, ..t })
+            }
+            MeshMutant::CoarsePositions => {
+                let grain = plan.mesh().radius() / 1024.0;
+                let positions = surrogate.positions.iter().map(|p| (*p / grain).round() * grain).collect();
+                test.plan(&SurrogateMesh { positions, ..surrogate.clone() }, view)
+            }
+        }
+    }
+}
+
+/// All vertices at their nodes, with their nodes' values.
+fn unconstrained(honest: &PreparedMesh) -> SurrogateMesh {
+    let (grid, surrogate) = (&honest.test.grid, &honest.surrogate);
+    let positions = surrogate.nodes.iter().map(|node| grid.position(*node)).collect();
+    let values = surrogate.nodes.iter().map(|node| grid.value(*node)).collect();
+    SurrogateMesh { positions, values, ..surrogate.clone() }
+}
+
+/// Two triangles for each zone.
+fn unstitched(honest: &PreparedMesh) -> SurrogateMesh {
+    let (grid, surrogate) = (&honest.test.grid, &honest.surrogate);
+    let vertex = |row: u32, column: u32| {
+        let node = grid.canonical(Node { row, column });
+        surrogate.nodes.iter().position(|n| *n == node).expect("a corner of a leaf is a vertex") as u32
+    };
+    let mut triangles = Vec::new();
+    for leaf in honest.test.selection.leaves() {
+        let range = grid.layout().descendants(leaf);
+        let (rows, columns) = ([range.rows.start, range.rows.end], [range.columns.start, range.columns.end]);
+        let [a, b] = [vertex(rows[0], columns[0]), vertex(rows[0], columns[1])];
+        let [c, d] = [vertex(rows[1], columns[1]), vertex(rows[1], columns[0])];
+        triangles.extend([[a, b, c], [a, c, d]]);
+    }
+    SurrogateMesh { triangles, ..surrogate.clone() }
+}
+
+fn with_triangles(plan: &MeshPlan, view: MeshView, edit: impl Fn(MeshTriangle) -> MeshTriangle) -> MeshPlan {
+    let mesh = plan.mesh();
+    let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+    let positions: Vec<DVec3> = mesh.vertices().iter().map(|v| mesh.center() + vector(v.position)).collect();
+    let values: Vec<f32> = mesh.vertices().iter().map(|v| v.value).collect();
+    let normals: Vec<DVec3> = mesh.vertices().iter().map(|v| vector(v.normal)).collect();
+    let triangles = mesh.triangles().iter().map(|t| edit(*t)).collect();
+    let normals = mesh.has_normals().then_some(normals.as_slice());
+    let edited = Mesh::new(&positions, &values, normals, triangles).expect("the same vertices");
+    MeshPlan::new(Arc::new(edited), view).expect("the same view")
+}
+
+fn turned(light: Light) -> Light {
+    let source = match light.source() {
+        LightSource::Head => LightSource::Direction(DVec3::new(0.2, -0.5, 0.7)),
+        LightSource::Direction(direction) => LightSource::Direction(-direction),
+        LightSource::Place(place) => LightSource::Place(-place),
+    };
+    Light::new(source, light.terms(), light.flat_below()).expect("a light's terms make a light")
+}
