@@ -11,7 +11,7 @@ use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Camera, Projection};
 use brickfield_curvilinear::{
     BudgetSelector, CurvilinearGrid, HeightField, Positions, QuadTree, Selection, SelectionWork, SizeSelector,
-    SurrogateMesh, View, hgt_value, surrogate_mesh,
+    SurrogateMesh, View, surrogate_mesh,
 };
 use rayon::prelude::*;
 
@@ -262,4 +262,9 @@ fn turns<T>(n: usize, mut turn: impl FnMut() -> T) -> String {
 
 fn mib(bytes: usize) -> f64 {
     bytes as f64 / f64::from(1 << 20)
+}
+
+/// An elevation of an HGT file in metres; NaN, a hole, for its void mark.
+fn hgt_value(elevation: i16) -> f32 {
+    if elevation == i16::MIN { f32::NAN } else { f32::from(elevation) }
 }

@@ -324,8 +324,3 @@ impl HeightField {
         }
     }
 }
-
-/// The value of an elevation of an HGT file in metres: NaN, a hole, for its void mark, -32,768.
-pub fn hgt_value(elevation: i16) -> f32 {
-    if elevation == i16::MIN { f32::NAN } else { f32::from(elevation) }
-}

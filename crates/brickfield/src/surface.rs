@@ -7,6 +7,7 @@
 //! ```
 
 use brickfield_core::glam::DVec3;
+use brickfield_core::{Knot, TransferError, TransferFunction, ValueRange};
 use brickfield_curvilinear::{CurvilinearGrid, Node, OtherGrid, Selection, SurrogateMesh, surrogate_mesh};
 use brickfield_frame::{Mesh, MeshError, MeshTriangle};
 use rayon::prelude::*;
@@ -30,6 +31,21 @@ pub enum SurfaceError {
     OtherGrid(#[from] OtherGrid),
     #[error(transparent)]
     Mesh(#[from] MeshError),
+}
+
+/// Blue, green and red over a range of values, as in Wynn et al. 1999, figure 9. (Its extinctions mean nothing.)
+///
+/// # Errors
+/// A range that is not finite.
+pub fn spectrum(range: ValueRange) -> Result<TransferFunction, TransferError> {
+    let colors = [[0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0]];
+    let value = |i: usize| range.min + (range.max - range.min) * (i as f64 / 4.0);
+    if range.max <= range.min {
+        return TransferFunction::constant(0.0, colors[0]);
+    }
+    TransferFunction::new(
+        colors.into_iter().enumerate().map(|(i, color)| Knot { value: value(i), extinction: 0.0, color }).collect(),
+    )
 }
 
 /// The mesh of a selection: zones as triangles without cracks, whose outlines are marked as lines.

@@ -1,8 +1,6 @@
 //! The backends that are held to account, and their mutants.
 
-use brickfield::frame::{
-    Backend, Capabilities, FramePlan, MeshFrame, MeshPlan, RenderError, ShaderFunction,
-};
+use brickfield::frame::{Backend, Capabilities, FramePlan, MeshFrame, MeshPlan, RenderError, ShaderFunction};
 use brickfield::{BackendKind, BackendStatus, Validation, backends, open_backend};
 use brickfield_core::Image;
 use brickfield_shaders::ShaderLibrary;

@@ -16,7 +16,7 @@ pub enum MeshMutant {
     NotConstrained,
     /// Coarse zones do not take up the vertices on their edges: the second patching pass is skipped.
     NotStitched,
-    /// A triangle in the middle is missing.
+    /// A triangle in front is missing.
     TriangleMissing,
     /// Rays pass the pixels' corners, not their centres.
     PixelCorner,
@@ -78,7 +78,7 @@ impl MeshMutant {
             MeshMutant::NotStitched => test.plan(&unstitched(honest), view),
             MeshMutant::TriangleMissing => {
                 let mut surrogate = surrogate.clone();
-                surrogate.triangles.remove(surrogate.triangles.len() / 2);
+                surrogate.triangles.remove(conspicuous(plan));
                 test.plan(&surrogate, view)
             }
             MeshMutant::PixelCorner => {
@@ -121,6 +121,24 @@ impl MeshMutant {
             }
         }
     }
+}
+
+/// A large triangle among those nearest to the eye, in the middle of the picture.
+fn conspicuous(plan: &MeshPlan) -> usize {
+    let half = 0.5 * plan.size().as_dvec2();
+    let seen = |(i, t): (usize, &MeshTriangle)| {
+        let [a, b, c] = t.corners.map(|corner| plan.rays().camera(plan.mesh().position(corner)));
+        let depth = (a.z + b.z + c.z) / 3.0;
+        let pixel = |p: DVec3| p.truncate() / if plan.rays().are_parallel() { 1.0 } else { p.z };
+        let middle = (pixel(a) + pixel(b) + pixel(c)) / 3.0;
+        let area = (pixel(b) - pixel(a)).perp_dot(pixel(c) - pixel(a)).abs();
+        let is_before = a.z.min(b.z).min(c.z) > plan.near();
+        (is_before && middle.abs().cmplt(0.8 * half).all()).then_some((depth, area, i))
+    };
+    let mut seen: Vec<_> = plan.mesh().triangles().iter().enumerate().filter_map(seen).collect();
+    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+    seen.truncate(seen.len().div_ceil(20));
+    seen.iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(_, _, i)| *i)
 }
 
 /// All vertices at their nodes, with their nodes' values.

@@ -226,9 +226,3 @@ fn bad_grids_are_named() {
     let short = CurvilinearGrid::new(1, 2, six(), vec![0.0; 6]).unwrap().with_ends(ends).unwrap_err().to_string();
     assert_eq!(short, "a closed axis of 1 rows; it needs at least 3");
 }
-
-#[test]
-fn void_elevations_are_holes() {
-    assert!(hgt_value(-32_768).is_nan());
-    assert_eq!([hgt_value(-32_767), hgt_value(8_848)], [-32_767.0, 8_848.0]);
-}

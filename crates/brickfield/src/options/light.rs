@@ -57,7 +57,11 @@ impl LightOptions {
         Ok(Scene { light: self.light(flat_below(range, grid.spacing().min_element()))?, ..scene })
     }
 
-    fn light(&self, flat_below: f64) -> Result<Option<Light>, LightError> {
+    /// The light that is asked for; `flat_below` is the gradient of a surface unless one is stated.
+    ///
+    /// # Errors
+    /// Numbers that make no light.
+    pub fn light(&self, flat_below: f64) -> Result<Option<Light>, LightError> {
         let Some(source) = self.light else { return Ok(None) };
         let LightOptions { ambient, diffuse, specular, shininess, .. } = *self;
         let terms = LightTerms { ambient, diffuse, specular, shininess };

@@ -4,6 +4,7 @@
 use brickfield_bricks::Downsampling;
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Aabb, BlockSide, BrickSide, Interblock, Level, ScalarType, WorldPos};
+use brickfield_curvilinear::GridPlane;
 use brickfield_frame::{Division, Join, Lengths, Mode, Placement, Slices, Target, Upload};
 use brickfield_io::{ByteOrder, RawSpec};
 use brickfield_lod::Criterion;
@@ -12,7 +13,7 @@ use brickfield_optics::{LightSource, LitSides, Normals, QuadratureRule};
 use super::{Background, Boxes};
 #[cfg(feature = "formats")]
 use crate::Codec;
-use crate::{Classification, MAX_IMAGE, Quality, TransparentBlocks};
+use crate::{Classification, MAX_IMAGE, Quality, SurfaceNormals, TransparentBlocks};
 
 /// Pixels along a facet of tessellated shells where none are asked for.
 pub const FACET_PIXELS: u32 = 16;
@@ -27,6 +28,31 @@ pub fn positive(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|v: &f64| v.is_finite() && *v > 0.0)
         .ok_or_else(|| "it must be a finite number above 0".to_owned())
+}
+
+/// A finite number.
+pub fn factor(text: &str) -> Result<f64, String> {
+    text.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| "it must be a finite number".to_owned())
+}
+
+/// A plane of a structured grid.
+pub fn plane(text: &str) -> Result<GridPlane, String> {
+    let parsed = text.split_once('=').and_then(|(axis, index)| Some((axis.trim(), index.trim().parse::<u32>().ok()?)));
+    match parsed {
+        Some(("i", index)) => Ok(GridPlane::I(index)),
+        Some(("j", index)) => Ok(GridPlane::J(index)),
+        Some(("k", index)) => Ok(GridPlane::K(index)),
+        _ => Err("a plane is i=N, j=N or k=N, N from 0, for example k=12".to_owned()),
+    }
+}
+
+/// Where the normals of a surface come from.
+pub fn surface_normals(text: &str) -> Result<SurfaceNormals, String> {
+    match text {
+        "grid" => Ok(SurfaceNormals::Grid),
+        "triangles" => Ok(SurfaceNormals::Triangles),
+        _ => Err("it must be grid or triangles".to_owned()),
+    }
 }
 
 /// A step: a number above 0, or a fraction.

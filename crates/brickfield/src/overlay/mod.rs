@@ -3,6 +3,7 @@
 //! Lines have no depth: the volume hides none of them. A picture with an overlay is for looking, not for measuring.
 
 mod canvas;
+mod color_bar;
 mod edges;
 mod projector;
 
@@ -11,6 +12,7 @@ use brickfield_core::{BrickId, BrickLayout, Camera, Grid, Image, IndexPos, Level
 use palette::{LinSrgb, Srgb};
 
 use canvas::{Ink, LinePicture};
+pub use color_bar::show_color_bar;
 use edges::edges;
 use projector::CameraProjector;
 

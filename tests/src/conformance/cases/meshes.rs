@@ -14,13 +14,12 @@ use crate::conformance::mesh_mutants::MeshMutant::*;
 use crate::conformance::meshes::{Covers, MeshTest};
 use crate::conformance::shader_mutants as shader;
 
-const SIZE: UVec2 = UVec2::new(96, 72);
-
 /// What differs between cases.
 #[derive(Clone)]
 struct MeshSetup {
     kind: GridKind,
     n_zones: [u32; 2],
+    size: UVec2,
     center: DVec3,
     /// The point that is looked at, from the centre.
     target: DVec3,
@@ -48,6 +47,7 @@ impl MeshSetup {
         MeshSetup {
             kind,
             n_zones: [19, 26],
+            size: UVec2::new(96, 72),
             center: DVec3::ZERO,
             target: DVec3::ZERO,
             eye: DVec3::new(1.0, -5.0, 4.0),
@@ -69,7 +69,7 @@ impl MeshSetup {
         let light = self.light.map(|source| Light::new(source, terms(), 1.0).expect("a light"));
         let view = MeshView {
             camera,
-            size: SIZE,
+            size: self.size,
             colors: colors(),
             coloring: self.coloring,
             light,
@@ -84,7 +84,7 @@ impl MeshSetup {
             Chosen::Random(seed) => random_selection(&tree, seed),
             Chosen::Budget(n) => {
                 let mut selector = BudgetSelector::new(std::sync::Arc::new(tree));
-                selector.update(&View::new(camera, SIZE).expect("a view"), n);
+                selector.update(&View::new(camera, self.size).expect("a view"), n);
                 selector.selection().clone()
             }
         }
@@ -219,8 +219,22 @@ fn watertight() -> Vec<Case> {
                 covers: Covers::Everything,
                 ..MeshSetup::new(kind)
             };
-            cases.push(setup.case(&format!("watertight-{}-{seed}", kind.name()), catches![TriangleMissing]));
+            let mutants = match kind {
+                // Cracks in a plane are seen only where vertices lie beside edges.
+                GridKind::Heights | GridKind::Torus => catches![TriangleMissing, NotConstrained],
+                GridKind::Flat | GridKind::Annulus | GridKind::Sheared => catches![TriangleMissing],
+            };
+            cases.push(setup.case(&format!("watertight-{}-{seed}", kind.name()), mutants));
         }
     }
+    let fine = MeshSetup {
+        n_zones: [150, 210],
+        size: UVec2::new(512, 384),
+        eye: DVec3::new(0.2, -0.6, 3.0),
+        projection: Projection::Perspective { fov_y: 0.5 },
+        covers: Covers::Everything,
+        ..MeshSetup::new(GridKind::Heights)
+    };
+    cases.push(fine.case("watertight-fine", catches![NotStitched, NotConstrained]));
     cases
 }

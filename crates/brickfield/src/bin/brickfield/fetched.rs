@@ -7,7 +7,8 @@ use brickfield::frame::Backend;
 use brickfield::options::{FinestVoxels, OptionError};
 use brickfield::{BlockResidency, StoreLimits, prepare_blocks};
 
-use crate::render::{check_of_store, check_validation, finish};
+use crate::backend::check_validation;
+use crate::render::{check_of_store, finish};
 use crate::{Failure, RenderArgs, mib, print};
 
 /// Fewer bytes than a picture takes.

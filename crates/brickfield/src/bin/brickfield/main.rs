@@ -1,5 +1,6 @@
 //! The `brickfield` command: look at a volume file, render it, save it in another format, list the backends.
 
+mod backend;
 mod convert;
 #[cfg(feature = "fetch")]
 mod fetched;
@@ -9,6 +10,7 @@ mod pack;
 mod render;
 #[cfg(feature = "serve")]
 mod serve;
+mod surface;
 
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
@@ -18,12 +20,17 @@ use std::process::ExitCode;
 use brickfield::Codec;
 #[cfg(feature = "fetch")]
 use brickfield::core::Aabb;
-use brickfield::io::SAVED_EXTENSIONS;
+use brickfield::core::glam::UVec2;
+use brickfield::curvilinear::GridPlane;
+use brickfield::io::{Limits, SAVED_EXTENSIONS};
 use brickfield::options::{
-    BlockArgs, Boxes, InputOptions, LightOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions, values,
+    Background, BlockArgs, Boxes, InputOptions, LightOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions,
+    values,
 };
 use brickfield::overlay::LEVEL_COLORS;
-use brickfield::{AdapterInfo, BackendError, BackendKind, BackendStatus, Trimming, Validation, backends};
+use brickfield::{AdapterInfo, BackendError, BackendStatus, SurfaceNormals, Trimming, Viewpoint, backends};
+
+use backend::BackendOptions;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
 
@@ -44,7 +51,9 @@ use clap::{Args, Parser, Subcommand};
   brickfield render dicom-folder/ -o head.exr --transfer ct-bone --camera \"front zoom=1.2\"
   brickfield render engine.vti -o inside.png --camera \"eye=80,100,60 target=200,128,60 up=0,0,1 fov=60\" --mode fast
   brickfield render head.nrrd -o bricks.png --lod error=2 --show-bricks
-  brickfield render head.nrrd -o planes.exr --polygons rgba16float --placement object-planes"
+  brickfield render head.nrrd -o planes.exr --polygons rgba16float --placement object-planes
+  brickfield surface N00E010.hgt -o terrain.png --zones 20000 --light 1,-1,2 --color-bar
+  brickfield surface combxyz.bin --solution combq.bin -o slice.png --plane k=12 --lines 1"
 )]
 struct Cli {
     #[command(subcommand)]
@@ -60,6 +69,8 @@ enum Command {
     Info(InfoArgs),
     /// Renders a picture of a volume file
     Render(Box<RenderArgs>),
+    /// Draws a surface of a structured grid, coloured by its values: terrain (HGT, USGS DEM, GeoTIFF), or a plane of a PLOT3D or VTK grid
+    Surface(Box<SurfaceArgs>),
     /// Saves a volume in another format: values, spacing and direction survive; what the format cannot state is noted
     Convert(ConvertArgs),
     /// Packs a volume of any size as OME-Zarr 0.5 with all coarser levels, in bounded memory
@@ -146,15 +157,8 @@ struct RenderArgs {
     /// Picture to write: .exr (linear, for measuring) or .png (sRGB, for looking)
     #[arg(short, long, value_name = "PICTURE")]
     out: PathBuf,
-    /// auto (the first GPU, else the CPU; drivers in software are not GPUs), cpu, wgpu or ash
-    #[arg(long, default_value = "auto")]
-    backend: String,
-    /// Adapter: its number or a part of its name, as `brickfield backends` lists them
-    #[arg(long)]
-    adapter: Option<String>,
-    /// Check all calls by the driver's validation layer (ash); what it says is printed and fails the command
-    #[arg(long)]
-    validation: bool,
+    #[command(flatten)]
+    backend: BackendOptions,
     #[command(flatten)]
     input: InputOptions,
     #[command(flatten)]
@@ -200,6 +204,69 @@ fn show_bricks_help() -> String {
     )
 }
 
+#[derive(Args)]
+struct SurfaceArgs {
+    /// File of structured grids: PLOT3D, HGT, USGS DEM, GeoTIFF, VTK (.vtr, .vts, .vtk)
+    file: PathBuf,
+    /// Picture to write: .exr (linear, for measuring) or .png (sRGB, for looking)
+    #[arg(short, long, value_name = "PICTURE")]
+    out: PathBuf,
+    #[command(flatten)]
+    backend: BackendOptions,
+    /// Most bytes that the grids may take, in MiB
+    #[arg(long, value_name = "MIB", default_value_t = Limits::default().max_bytes >> 20,
+          value_parser = clap::value_parser!(u64).range(1..1 << 43))]
+    max_mib: u64,
+    /// PLOT3D file with the values of the grid's nodes (q or f)
+    #[arg(long, value_name = "FILE")]
+    solution: Option<PathBuf>,
+    /// Grid of a file that has several: its number, from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    grid: usize,
+    /// Values: their name or number; the first ones unless stated
+    #[arg(long, value_name = "WHICH")]
+    field: Option<String>,
+    /// Plane of the grid: i=N, j=N or k=N, from 0; k=0 unless stated, which of terrain is a height field
+    #[arg(long, value_name = "PLANE", value_parser = values::plane)]
+    plane: Option<GridPlane>,
+    /// By how much heights of terrain are exaggerated; 0: flat
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = values::factor, allow_hyphen_values = true)]
+    exaggeration: f64,
+    /// Size of the picture in pixels
+    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = values::size)]
+    size: UVec2,
+    /// Where the picture is taken from, as of `brickfield render`
+    #[arg(long, value_name = "VIEW", default_value = "top")]
+    camera: Viewpoint,
+    /// Background behind the picture in PNG files, linear: R,G,B or one number for grey
+    #[arg(long, value_name = "RGB", default_value = "0", value_parser = values::background)]
+    background: Background,
+    /// Colours of values: a JSON or TOML file of knots, as of `brickfield render --transfer`; blue, green and red over the values' range unless
+    /// stated
+    #[arg(long, value_name = "FILE")]
+    colors: Option<PathBuf>,
+    /// Interpolate colours between corners, and not values
+    #[arg(long)]
+    gouraud: bool,
+    #[command(flatten)]
+    light: LightOptions,
+    /// Normals of the surface: grid (of its finest zones, whatever is drawn) or triangles (each is a plane)
+    #[arg(long, value_name = "WHICH", default_value = "grid", value_parser = values::surface_normals)]
+    normals: SurfaceNormals,
+    /// Draw the outlines of zones, so many pixels wide
+    #[arg(long, value_name = "PIXELS", value_parser = values::positive, allow_hyphen_values = true)]
+    lines: Option<f64>,
+    /// Draw so many zones, those with the greatest errors divided first; all zones unless stated
+    #[arg(long, value_name = "N", conflicts_with = "granularity", value_parser = clap::value_parser!(u32).range(1..))]
+    zones: Option<u32>,
+    /// Draw zones as coarse as they may be without being larger than so many pixels
+    #[arg(long, value_name = "PIXELS", value_parser = values::positive, allow_hyphen_values = true)]
+    granularity: Option<f64>,
+    /// Draw a bar of the colours with their values
+    #[arg(long)]
+    color_bar: bool,
+}
+
 /// Why the command failed, by exit status.
 enum Failure {
     /// Status 2.
@@ -210,13 +277,6 @@ enum Failure {
     Validation { n_messages: usize },
     /// Status 1.
     Other(Box<dyn std::error::Error>),
-}
-
-/// Calls are checked through ash only.
-#[derive(Debug, thiserror::Error)]
-#[error("--validation: backend {kind} has no validation layer; take --backend ash")]
-struct ValidationNeedsAsh {
-    kind: BackendKind,
 }
 
 impl Failure {
@@ -252,6 +312,7 @@ fn main() -> ExitCode {
         #[cfg(feature = "formats")]
         Command::Pack(args) => pack::run(&args),
         Command::Render(args) => render::run(&args),
+        Command::Surface(args) => surface::run(&args),
         #[cfg(feature = "serve")]
         Command::Serve(args) => serve::run(&args),
         Command::Backends => print(&listed_backends()),
@@ -280,36 +341,6 @@ fn listed_backends() -> String {
         Err(reason) => format!("{:5} absent: {reason}\n", status.kind.name()),
     };
     backends().into_iter().map(of_status).collect()
-}
-
-impl RenderArgs {
-    /// The backends to try, in order.
-    fn candidates(&self) -> Result<Vec<BackendKind>, Failure> {
-        if self.backend != "auto" {
-            let kind: BackendKind = self.backend.parse().map_err(Failure::usage)?;
-            if self.validation && kind != BackendKind::Ash {
-                return Err(Failure::usage(ValidationNeedsAsh { kind }));
-            }
-            return Ok(vec![kind]);
-        }
-        if self.validation {
-            return Ok(vec![BackendKind::Ash]);
-        }
-        if self.adapter.is_some() {
-            return Ok(vec![BackendKind::Ash, BackendKind::Wgpu, BackendKind::Cpu]);
-        }
-        // A driver in software is slower than the CPU backend: it is for those who ask for it.
-        let is_gpu = |status: &BackendStatus| matches!(&status.adapters, Ok(a) if a.iter().any(|a| !a.is_software));
-        let mut kinds: Vec<_> = backends().iter().filter(|status| is_gpu(status)).map(|status| status.kind).collect();
-        // `backends` lists ash last; here it comes first.
-        kinds.reverse();
-        kinds.push(BackendKind::Cpu);
-        Ok(kinds)
-    }
-
-    fn validation(&self) -> Validation {
-        if self.validation { Validation::On } else { Validation::Off }
-    }
 }
 
 fn mib(bytes: u64) -> f64 {

@@ -16,11 +16,12 @@ use brickfield::options::Blocks;
 use brickfield::options::{BlockSubject, Boxes, FinestVoxels, OptionError, Subject, values};
 use brickfield::overlay::{LevelColor, show_bricks, show_bricks_faintly};
 use brickfield::{
-    BackendError, BackendKind, BlockResidency, CacheCounts, CacheOptions, Classification, Residency, Scene, Technique,
-    TrimCache, TrimResidency, TrimmedVolume, Trimming, check_picture_path, open_backend, prepare, prepare_blocks,
-    prepare_trimmed, prepare_trimmed_batches, render_ahead, write_picture,
+    BackendKind, BlockResidency, CacheCounts, CacheOptions, Classification, Residency, Scene, Technique, TrimCache,
+    TrimResidency, TrimmedVolume, Trimming, check_picture_path, prepare, prepare_blocks, prepare_trimmed,
+    prepare_trimmed_batches, render_ahead, write_picture,
 };
 
+use crate::backend::check_validation;
 use crate::{Failure, RenderArgs, mib, print};
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
@@ -30,7 +31,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     args.sampling.check()?;
     args.light.check()?;
     check_together(args)?;
-    let mut backend = open(args)?;
+    let mut backend = args.backend.open()?;
     #[cfg(feature = "fetch")]
     if let Some(kib) = args.fetch_kib {
         return crate::fetched::render(args, kib, backend.as_mut());
@@ -259,23 +260,7 @@ fn note_if_nothing_shows(plan: &FramePlan) {
     }
 }
 
-pub(crate) fn check_validation(messages: &[String]) -> Result<(), Failure> {
-    messages.iter().for_each(|m| eprintln!("validation: {m}"));
-    if messages.is_empty() { Ok(()) } else { Err(Failure::Validation { n_messages: messages.len() }) }
-}
-
 /// The first candidate that opens; the last one's error if none does.
-fn open(args: &RenderArgs) -> Result<Box<dyn Backend>, Failure> {
-    let mut last: Option<BackendError> = None;
-    for kind in args.candidates()? {
-        match open_backend(kind, args.adapter.as_deref(), args.validation()) {
-            Ok(backend) => return Ok(backend),
-            Err(e) => last = Some(e),
-        }
-    }
-    Err(Failure::Backend(last.expect("at least one candidate")))
-}
-
 /// The bricks whose boxes are shown over the picture.
 struct ShownBricks<'a> {
     drawn: &'a [BrickId],

@@ -1,0 +1,199 @@
+//! `brickfield surface`.
+
+use std::sync::Arc;
+
+use brickfield::core::glam::{DVec3, UVec3};
+use brickfield::core::{Aabb, Camera, Grid, GridPoints, NodeField, StructuredGrid, TransferFunction, ValueRange};
+use brickfield::curvilinear::{BudgetSelector, CurvilinearGrid, GridPlane, QuadTree, Selection, SizeSelector, View};
+use brickfield::frame::{Coloring, MeshFrame, MeshLines, MeshPlan, MeshView};
+use brickfield::io::{GridOptions, Limits, OpenedGrids, WorldFrame, open_grid};
+use brickfield::optics::read_transfer;
+use brickfield::options::OptionError;
+use brickfield::overlay::show_color_bar;
+use brickfield::{check_picture_path, spectrum, surface_mesh, write_picture};
+
+use crate::backend::check_validation;
+use crate::{Failure, SurfaceArgs, print};
+
+/// What of a file cannot be shown.
+#[derive(Debug, thiserror::Error)]
+enum SurfaceFault {
+    #[error("--grid {wanted}: the file has {n} grids, 0 to {}", n - 1)]
+    NoGrid { wanted: usize, n: usize },
+    #[error("--field {wanted:?}: the grid has {}", if names.is_empty() { "no values; state the file that has them by --solution" } else { names })]
+    NoField { wanted: String, names: String },
+    #[error("the grid has no values to be coloured by")]
+    NoValues,
+    #[error("--plane {axis}={index}: the grid has {n} nodes along {axis}, 0 to {}", n - 1)]
+    NoPlane { axis: char, index: u32, n: u32 },
+}
+
+pub(crate) fn run(args: &SurfaceArgs) -> Result<(), Failure> {
+    check_picture_path(&args.out).map_err(Failure::usage)?;
+    args.camera.check().map_err(OptionError::from)?;
+    args.light.check()?;
+    let mut backend = args.backend.open()?;
+    let subject = Subject::open(args)?;
+    let camera =
+        args.camera.camera(&subject.box_grid(), WorldFrame::default(), args.size).map_err(OptionError::from)?;
+    let selection = subject.select(args, &camera)?;
+    let mesh = Arc::new(surface_mesh(subject.tree.grid(), &selection, args.normals)?);
+    let view = MeshView {
+        camera,
+        size: args.size,
+        colors: subject.colors.clone(),
+        coloring: if args.gouraud { Coloring::Gouraud } else { Coloring::Values },
+        light: args.light.light(1.0).map_err(OptionError::from)?,
+        lines: args.lines.map(|width| MeshLines { width, color: [0.0; 3] }),
+    };
+    let plan = MeshPlan::new(mesh, view).map_err(Failure::usage)?;
+    let frame = backend.render_mesh(&plan)?;
+    let mut image = frame.image();
+    if args.color_bar {
+        image = show_color_bar(&image, &subject.colors, subject.range, &subject.title());
+    }
+    let attributes = attributes(args, &subject, &selection, &plan);
+    write_picture(&args.out, &image, args.background.0, &attributes)?;
+    print(&summary(&subject, &selection, &plan, &frame, backend.describe().backend))?;
+    check_validation(&backend.validation_messages())
+}
+
+/// A surface that is ready to be drawn.
+struct Subject {
+    tree: Arc<QuadTree>,
+    field: String,
+    unit: Option<String>,
+    range: ValueRange,
+    colors: TransferFunction,
+}
+
+impl Subject {
+    fn open(args: &SurfaceArgs) -> Result<Subject, Failure> {
+        let mut options = GridOptions::from(Limits { max_bytes: args.max_mib.saturating_mul(1 << 20) });
+        options.solution.clone_from(&args.solution);
+        let OpenedGrids { mut grids, notes, .. } = open_grid(&args.file, &options)?;
+        notes.iter().for_each(|note| eprintln!("note: {note}"));
+        let (wanted, n) = (args.grid, grids.len());
+        if wanted >= n {
+            return Err(Failure::usage(SurfaceFault::NoGrid { wanted, n }));
+        }
+        let grid = grids.swap_remove(wanted);
+        let field = field_of(&grid, args.field.as_deref()).map_err(Failure::usage)?;
+        let surface = zones(&grid, field, args)?;
+        let NodeField { name, unit, .. } = &grid.fields()[field];
+        let tree = Arc::new(QuadTree::build(surface));
+        let range = range_of(tree.grid());
+        let colors = match &args.colors {
+            Some(path) => read_transfer(path).map_err(OptionError::from)?,
+            None => spectrum(range).map_err(OptionError::from)?,
+        };
+        Ok(Subject { tree, field: name.clone(), unit: unit.clone(), range, colors })
+    }
+
+    /// A grid of one voxel around the surface: cameras find their place by it.
+    fn box_grid(&self) -> Grid {
+        let Aabb { min, max } = self.tree.extent(self.tree.layout().root());
+        let size = (max - min).max(DVec3::splat((max - min).max_element() * 1e-6)).max(DVec3::splat(f64::MIN_POSITIVE));
+        let first_sample = min + 0.5 * size;
+        Grid::from_first_sample(UVec3::ONE, first_sample, brickfield::core::glam::DMat3::from_diagonal(size))
+            .expect("a box of a surface has a size")
+    }
+
+    fn select(&self, args: &SurfaceArgs, camera: &Camera) -> Result<Selection, Failure> {
+        let view = View::new(*camera, args.size).map_err(Failure::usage)?;
+        if let Some(n_zones) = args.zones {
+            let mut selector = BudgetSelector::new(self.tree.clone());
+            selector.update(&view, n_zones as usize);
+            return Ok(selector.selection().clone());
+        }
+        // Zones below no number of pixels are the final ones.
+        let mut selector = SizeSelector::new(self.tree.clone(), args.granularity.unwrap_or(f64::MIN_POSITIVE))
+            .map_err(Failure::usage)?;
+        selector.update(&view);
+        Ok(selector.selection().clone())
+    }
+
+    fn title(&self) -> String {
+        match &self.unit {
+            Some(unit) => format!("{} ({unit})", self.field),
+            None => self.field.clone(),
+        }
+    }
+}
+
+/// The field that is asked for, by its number or name; the first one if none is.
+fn field_of(grid: &StructuredGrid, wanted: Option<&str>) -> Result<usize, SurfaceFault> {
+    let fields = grid.fields();
+    let Some(wanted) = wanted else {
+        return if fields.is_empty() { Err(SurfaceFault::NoValues) } else { Ok(0) };
+    };
+    let by_name = fields.iter().position(|field| field.name == wanted);
+    let by_number = wanted.parse().ok().filter(|i: &usize| *i < fields.len());
+    by_name.or(by_number).ok_or_else(|| SurfaceFault::NoField {
+        wanted: wanted.to_owned(),
+        names: fields.iter().map(|field| format!("{:?}", field.name)).collect::<Vec<_>>().join(", "),
+    })
+}
+
+/// The zones of the plane that is asked for; terrain is a height field unless it is to be flat.
+fn zones(grid: &StructuredGrid, field: usize, args: &SurfaceArgs) -> Result<CurvilinearGrid, Failure> {
+    let n = grid.n_nodes();
+    let plane = args.plane.unwrap_or(GridPlane::K(0));
+    let (axis, index, n_along) = match plane {
+        GridPlane::I(i) => ('i', i, n.x),
+        GridPlane::J(j) => ('j', j, n.y),
+        GridPlane::K(k) => ('k', k, n.z),
+    };
+    if index >= n_along {
+        return Err(Failure::usage(SurfaceFault::NoPlane { axis, index, n: n_along }));
+    }
+    let is_terrain = n.z == 1 && args.plane.is_none() && matches!(grid.points(), GridPoints::Even { .. });
+    let made = match is_terrain {
+        true => CurvilinearGrid::of_heights(grid, field, args.exaggeration),
+        false => CurvilinearGrid::of_plane(grid, plane, field),
+    };
+    Ok(made?)
+}
+
+fn range_of(grid: &CurvilinearGrid) -> ValueRange {
+    let values = || grid.values().iter().filter(|v| !v.is_nan()).map(|v| f64::from(*v));
+    let (min, max) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+    if min <= max { ValueRange { min, max } } else { ValueRange { min: 0.0, max: 0.0 } }
+}
+
+fn attributes(
+    args: &SurfaceArgs,
+    subject: &Subject,
+    selection: &Selection,
+    plan: &MeshPlan,
+) -> Vec<(&'static str, String)> {
+    let file = args.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    vec![
+        ("file", file),
+        ("field", subject.field.clone()),
+        ("zones", selection.n_leaves().to_string()),
+        ("triangles", plan.mesh().triangles().len().to_string()),
+        ("greatest error of a zone", selection.greatest_error(&subject.tree).to_string()),
+    ]
+}
+
+fn summary(subject: &Subject, selection: &Selection, plan: &MeshPlan, frame: &MeshFrame, backend: &str) -> String {
+    let grid = subject.tree.grid();
+    let error = f64::from(selection.greatest_error(&subject.tree));
+    let width = subject.range.max - subject.range.min;
+    let percent = if width > 0.0 { 100.0 * error / width } else { 0.0 };
+    format!(
+        "{} x {} zones of {}, {} to {}; {} zones drawn, {} triangles, error at most {error} ({percent:.2} % of the range)\n\
+         {backend}: {:.1} ms, upload {:.1} ms of {} KiB\n",
+        grid.n_columns(),
+        grid.n_rows(),
+        subject.title(),
+        subject.range.min,
+        subject.range.max,
+        selection.n_leaves(),
+        plan.mesh().triangles().len(),
+        frame.timing.device_ms.unwrap_or(frame.timing.wall_ms),
+        frame.timing.upload_ms,
+        frame.uploaded_bytes >> 10,
+    )
+}
