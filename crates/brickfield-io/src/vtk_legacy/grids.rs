@@ -3,8 +3,9 @@
 use brickfield_core::glam::UVec3;
 use brickfield_core::{GridPoints, StructuredGrid, Voxels};
 
+use super::dataset::{Dataset, Wanted};
 use super::read_array;
-use super::sections::{Dataset, Sections, StoredArray, Wanted};
+use super::sections::{Sections, StoredArray};
 use crate::files::ByteSource;
 use crate::grids::{add_array, check_nodes, checked_nodes, n_field_bytes, positions};
 use crate::limits::CheckedShape;

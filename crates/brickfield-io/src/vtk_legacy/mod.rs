@@ -2,6 +2,7 @@
 //!
 //! Versions 1.0 to 5.1, as text and binary (big endian). Not: other data sets, strings, text and binary mixed.
 
+mod dataset;
 mod grids;
 mod sections;
 mod shares;
@@ -18,8 +19,9 @@ use crate::opened::FileFacts;
 use crate::samples::{allocate, append_text, least_text_bytes};
 use crate::vtk_arrays::{choose, dims};
 use crate::{ByteOrder, Format, OpenOptions, Opened, ReadError};
+use dataset::Wanted;
 pub(crate) use grids::read_grid;
-use sections::{Sections, StoredArray, Wanted};
+use sections::{Sections, StoredArray};
 use shares::Shares;
 
 /// Reads structured points.

@@ -4,10 +4,10 @@ use std::str::FromStr;
 
 use brickfield_core::ScalarType;
 
+use super::dataset::{Dataset, Wanted};
 use super::types::{decoded, sample};
 use crate::error::check_length;
 use crate::files::{ByteSource, n_bytes_left};
-use crate::grids::OPENED_BY;
 use crate::lines::HeaderLines;
 use crate::samples::skip_text;
 use crate::stored::seek_forward;
@@ -27,32 +27,6 @@ impl StoredArray {
     pub(super) fn what(&self) -> String {
         format!("array {:?}", self.about.name)
     }
-}
-
-/// What a file is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Dataset {
-    Image,
-    Rectilinear,
-    Structured,
-}
-
-impl Dataset {
-    fn named(name: &str) -> Option<Dataset> {
-        match name.to_ascii_lowercase().as_str() {
-            "structured_points" => Some(Dataset::Image),
-            "rectilinear_grid" => Some(Dataset::Rectilinear),
-            "structured_grid" => Some(Dataset::Structured),
-            _ => None,
-        }
-    }
-}
-
-/// What a caller reads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Wanted {
-    Image,
-    Grid,
 }
 
 pub(super) struct Sections {
@@ -128,21 +102,7 @@ impl Sections {
     }
 
     fn enter_dataset(&mut self, words: &Words) -> Result<(), ReadError> {
-        let name = words.get(1);
-        match (Dataset::named(name), self.wanted) {
-            (Some(Dataset::Image), Wanted::Grid) => {
-                let supported = "RECTILINEAR_GRID and STRUCTURED_GRID are; `open` reads it as a volume";
-                return Err(ReadError::unsupported("DATASET", name, supported));
-            }
-            (Some(Dataset::Rectilinear | Dataset::Structured), Wanted::Image) => {
-                return Err(ReadError::unsupported("DATASET", name, OPENED_BY));
-            }
-            (Some(dataset), _) => self.dataset = dataset,
-            (None, Wanted::Image) => return Err(ReadError::unsupported("DATASET", name, "STRUCTURED_POINTS is")),
-            (None, Wanted::Grid) => {
-                return Err(ReadError::unsupported("DATASET", name, "RECTILINEAR_GRID and STRUCTURED_GRID are"));
-            }
-        }
+        self.dataset = Dataset::of_name(words.get(1), self.wanted)?;
         Ok(())
     }
 

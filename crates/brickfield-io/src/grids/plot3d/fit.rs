@@ -1,23 +1,13 @@
 //! The layout of a PLOT3D file, found from its length.
 
-use std::io::{Read, SeekFrom};
+use std::io::SeekFrom;
 
-use brickfield_core::glam::UVec3;
-
-use super::header::{Sizes, read_sizes};
-use super::layout::{Binary, Content, Encoding, Layout, Plot3dLayout, Precision};
-use crate::files::{ByteSource, n_bytes_left};
-use crate::samples::next_token;
-use crate::{ByteOrder, ReadError};
-
-/// A layout that a file could have, by its first numbers.
-#[derive(Clone, Debug)]
-pub(super) struct Candidate {
-    pub(super) layout: Layout,
-    pub(super) sizes: Sizes,
-    /// What the whole file then has: bytes, or numbers of text.
-    n_in_all: u128,
-}
+use super::candidates::{Candidate, FileLength, MARK_BYTES, candidates, grids, has_marks, records};
+use super::header::Sizes;
+use super::layout::{Content, Layout, Plot3dLayout};
+use super::numbers::Numbers;
+use crate::ReadError;
+use crate::files::ByteSource;
 
 /// The layout that was found.
 #[derive(Clone, Debug)]
@@ -26,45 +16,6 @@ pub(super) struct Found {
     pub(super) sizes: Sizes,
     /// Zeros after the last number.
     pub(super) n_spare_bytes: u64,
-}
-
-/// The length of a file as layouts count it.
-#[derive(Clone, Copy, Debug)]
-struct FileLength {
-    n_bytes: u64,
-    /// The length in numbers, if the file is text.
-    n_numbers: Option<u64>,
-}
-
-impl FileLength {
-    fn measure(source: &mut dyn ByteSource) -> Result<FileLength, ReadError> {
-        let fault = |e| ReadError::io("the file", e);
-        source.seek(SeekFrom::Start(0)).map_err(fault)?;
-        let n_bytes = n_bytes_left(source)?;
-        let mut head = Vec::new();
-        (&mut *source).take(4096).read_to_end(&mut head).map_err(fault)?;
-        let is_text = head.iter().all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace());
-        if !is_text {
-            return Ok(FileLength { n_bytes, n_numbers: None });
-        }
-        source.seek(SeekFrom::Start(0)).map_err(fault)?;
-        let (mut token, mut n_numbers) = (Vec::new(), 0);
-        loop {
-            next_token(source, &mut token).map_err(fault)?;
-            if token.is_empty() {
-                return Ok(FileLength { n_bytes, n_numbers: Some(n_numbers) });
-            }
-            n_numbers += 1;
-        }
-    }
-
-    fn n_in_all(self) -> u64 {
-        self.n_numbers.unwrap_or(self.n_bytes)
-    }
-
-    fn unit(self) -> &'static str {
-        if self.n_numbers.is_some() { "numbers" } else { "bytes" }
-    }
 }
 
 /// The contents of a grid file, and of the file that belongs to it.
@@ -137,72 +88,6 @@ fn find_only_values(source: &mut dyn ByteSource, length: FileLength) -> Result<O
     Ok(fitting(source, length, &candidates)?.into_iter().next())
 }
 
-/// All layouts whose sizes make sense.
-fn candidates(
-    source: &mut dyn ByteSource,
-    length: FileLength,
-    contents: &[Content],
-    stated: &Plot3dLayout,
-) -> Result<Vec<Candidate>, ReadError> {
-    let mut candidates = Vec::new();
-    for encoding in encodings(length) {
-        for is_multi_grid in [false, true] {
-            for n_axes in [3, 2] {
-                for content in contents {
-                    let layout = Layout { encoding, is_multi_grid, n_axes, content: *content };
-                    if !layout.agrees(stated) {
-                        continue;
-                    }
-                    if let Some(sizes) = read_sizes(source, length.n_bytes, &layout)? {
-                        let n_in_all = n_in_all(&layout, &sizes);
-                        candidates.push(Candidate { layout, sizes, n_in_all });
-                    }
-                }
-            }
-        }
-    }
-    Ok(candidates)
-}
-
-fn encodings(length: FileLength) -> Vec<Encoding> {
-    if length.n_numbers.is_some() {
-        return vec![Encoding::Text];
-    }
-    let mut encodings = Vec::new();
-    for order in [ByteOrder::Little, ByteOrder::Big] {
-        for precision in [Precision::F32, Precision::F64] {
-            for has_record_marks in [false, true] {
-                encodings.push(Encoding::Binary(Binary { order, precision, has_record_marks }));
-            }
-        }
-    }
-    encodings
-}
-
-/// Bytes of the whole file, or numbers of text.
-fn n_in_all(layout: &Layout, sizes: &Sizes) -> u128 {
-    let (real, integer, marks) = match layout.encoding {
-        Encoding::Text => (1, 1, 0),
-        Encoding::Binary(binary) => {
-            (binary.precision.n_bytes() as u128, 4, if binary.has_record_marks { 8 } else { 0 })
-        }
-    };
-    let n_axes = u128::from(layout.n_axes);
-    let of_grid = |(n, n_functions): (&UVec3, &u32)| {
-        let n: u128 = n.to_array().into_iter().map(u128::from).product();
-        match layout.content {
-            Content::Grid { has_iblank } => {
-                let iblank = if has_iblank { integer } else { 0 };
-                n.saturating_mul(n_axes * real + iblank).saturating_add(marks)
-            }
-            Content::Solution => n.saturating_mul((n_axes + 2) * real).saturating_add(4 * real + 2 * marks),
-            Content::Functions => n.saturating_mul(u128::from(*n_functions) * real).saturating_add(marks),
-        }
-    };
-    let grids = sizes.grids.iter().zip(&sizes.n_functions).map(of_grid);
-    grids.fold(sizes.n_before.into(), u128::saturating_add)
-}
-
 /// Zeros that fill the last block of a file. More of them would hide a layout of more numbers.
 const MOST_SPARE_BYTES: u128 = 4096;
 
@@ -211,6 +96,9 @@ fn fitting(source: &mut dyn ByteSource, length: FileLength, candidates: &[Candid
     let mut fitting = Vec::new();
     for candidate in candidates.iter().filter(|c| c.n_in_all == u128::from(length.n_in_all())) {
         fitting.push(candidate.found(0));
+    }
+    if fitting.len() > 1 {
+        prefer_records(source, &mut fitting)?;
     }
     if !fitting.is_empty() || length.n_numbers.is_some() {
         return Ok(fitting);
@@ -224,14 +112,35 @@ fn fitting(source: &mut dyn ByteSource, length: FileLength, candidates: &[Candid
     Ok(fitting)
 }
 
-impl Candidate {
-    fn found(&self, n_spare_bytes: u64) -> Found {
-        Found { layout: self.layout, sizes: self.sizes.clone(), n_spare_bytes }
+/// Leaves the one layout in records whose marks are all right, if there is one: that is no accident.
+fn prefer_records(source: &mut dyn ByteSource, fitting: &mut Vec<Found>) -> Result<(), ReadError> {
+    let mut marked = Vec::new();
+    for found in &*fitting {
+        if has_marks(&found.layout) && marks_agree(source, found)? {
+            marked.push(found.clone());
+        }
     }
+    if marked.len() == 1 {
+        *fitting = marked;
+    }
+    Ok(())
+}
 
-    fn described(&self, unit: &str) -> String {
-        format!("{} {unit} ({}; {})", self.n_in_all, self.layout, grids(&self.sizes))
+/// Whether each record has its length before and after it. The layout fits the file.
+fn marks_agree(source: &mut dyn ByteSource, found: &Found) -> Result<bool, ReadError> {
+    let mut position = found.sizes.n_before;
+    for n_bytes in records(&found.layout, &found.sizes) {
+        let n_bytes = n_bytes as u64;
+        for start in [position, position + 4 + n_bytes] {
+            source.seek(SeekFrom::Start(start)).map_err(|e| ReadError::io("a record mark", e))?;
+            let mut numbers = Numbers { source, encoding: found.layout.encoding };
+            if numbers.mark(n_bytes, "a record").is_err() {
+                return Ok(false);
+            }
+        }
+        position += n_bytes + 2 * MARK_BYTES as u64;
     }
+    Ok(true)
 }
 
 fn ends_with_zeros(source: &mut dyn ByteSource, start: u64) -> Result<bool, ReadError> {
@@ -248,12 +157,6 @@ fn ends_with_zeros(source: &mut dyn ByteSource, start: u64) -> Result<bool, Read
         }
         source.consume(n);
     }
-}
-
-fn grids(sizes: &Sizes) -> String {
-    let first = sizes.grids[0];
-    let more = if sizes.grids.len() > 1 { format!(" and {} more", sizes.grids.len() - 1) } else { String::new() };
-    format!("{} x {} x {} nodes{more}", first.x, first.y, first.z)
 }
 
 /// Candidates in a message: more do not fit one line.

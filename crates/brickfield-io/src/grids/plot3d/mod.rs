@@ -13,6 +13,7 @@
 //! and after each record); or all is text. A file does not say which: its length does, for all layouts are tried, and one
 //! has to fit. Zeros may follow. Not: the format "planes", records of more than 2 GiB, repeat counts in text.
 
+mod candidates;
 mod fit;
 mod header;
 mod layout;
