@@ -131,17 +131,20 @@ pub(crate) fn choose(arrays: &[&VtkArray], found: &mut FileFacts) -> Result<Opti
     Ok(Some(chosen as usize))
 }
 
+/// VTK's array of marks of points or cells (vtkDataSetAttributes.h).
+pub(crate) const GHOSTS: &str = "vtkGhostType";
+
 /// Notes the arrays of cells of a grid.
 ///
 /// # Errors
-/// Arrays of cells only: means at nodes would be other values than the file's.
+/// Values of cells only: means at nodes would be other values than the file's.
 pub(crate) fn only_points<'a>(
     arrays: impl Iterator<Item = &'a VtkArray>,
     notes: &mut Vec<GridNote>,
 ) -> Result<(), ReadError> {
     let (of_points, of_cells): (Vec<_>, Vec<_>) = arrays.partition(|array| array.support == Support::Points);
     let names: Vec<_> = of_cells.iter().map(|array| array.name.clone()).collect();
-    if !names.is_empty() && of_points.is_empty() {
+    if of_points.is_empty() && names.iter().any(|name| name != GHOSTS) {
         let supported = "those of points are: bring cell data to points first (ParaView: Cell Data to Point Data)";
         return Err(ReadError::unsupported("arrays of cells only,", names.join(", "), supported));
     }

@@ -13,7 +13,8 @@ pub enum GridNote {
     SolutionBeside { name: String },
     /// Zeros after the last number of a PLOT3D file.
     SpareBytes { what: String, n_bytes: u64 },
-    /// The four numbers before the values of a PLOT3D solution; `grid` counts from 0, `alpha` is in degrees.
+    /// The four numbers before the values of a PLOT3D solution, of this grid and of those after it up to the next note;
+    /// `grid` counts from 0, `alpha` is in degrees.
     FlowConditions { grid: usize, mach: f64, alpha: f64, reynolds: f64, time: f64 },
     /// Arrays of cells beside those of nodes.
     CellDataLeftOut { names: Vec<String> },

@@ -5,10 +5,9 @@ use brickfield_core::{NodeField, Scalar, StructuredGrid, Voxels, with_voxels};
 
 use crate::ReadError;
 use crate::numbers::with_room;
-use crate::vtk_arrays::VtkArray;
+use crate::vtk_arrays::{GHOSTS, VtkArray};
 
-/// VTK's array of marks, and its mark of a point that is left out (vtkDataSetAttributes.h, HIDDENPOINT).
-const GHOSTS: &str = "vtkGhostType";
+/// The mark of a point that is left out (vtkDataSetAttributes.h, HIDDENPOINT).
 const HIDDEN_POINT: u64 = 2;
 
 /// The grid with the fields of an array, whose numbers lie node after node; vtkGhostType has holes instead.

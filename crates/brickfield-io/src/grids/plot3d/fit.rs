@@ -19,8 +19,8 @@ pub(super) struct Found {
 }
 
 /// The contents of a grid file, and of the file that belongs to it.
-pub(super) const GRIDS: [Content; 2] = [Content::Grid { has_iblank: false }, Content::Grid { has_iblank: true }];
-pub(super) const VALUES: [Content; 2] = [Content::Solution, Content::Functions];
+const GRIDS: [Content; 2] = [Content::Grid { has_iblank: false }, Content::Grid { has_iblank: true }];
+const VALUES: [Content; 2] = [Content::Solution, Content::Functions];
 
 /// The one layout of a grid that fits the file.
 ///
@@ -74,13 +74,13 @@ pub(super) fn find_values(
     }
 }
 
-/// Whether the file is PLOT3D beyond doubt: one layout of grids or values fits it exactly.
+/// Whether a layout of grids or of a solution fits the file exactly. Functions would not tell: three sizes and their product of
+/// numbers are any raw file with a small header.
 pub(crate) fn is_plot3d(source: &mut dyn ByteSource) -> Result<bool, ReadError> {
     let length = FileLength::measure(source)?;
-    let all = [GRIDS, VALUES].concat();
-    let candidates = candidates(source, length, &all, &Plot3dLayout::default())?;
-    let is_exact = |candidate: &Candidate| candidate.n_in_all == u128::from(length.n_in_all());
-    Ok(candidates.iter().any(is_exact))
+    let contents = [GRIDS[0], GRIDS[1], Content::Solution];
+    let candidates = candidates(source, length, &contents, &Plot3dLayout::default())?;
+    Ok(candidates.iter().any(|candidate| candidate.n_in_all == u128::from(length.n_in_all())))
 }
 
 fn find_only_values(source: &mut dyn ByteSource, length: FileLength) -> Result<Option<Found>, ReadError> {

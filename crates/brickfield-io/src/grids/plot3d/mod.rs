@@ -142,11 +142,16 @@ fn n_in(n_nodes: UVec3) -> usize {
 
 /// Adds the fields of a solution or of functions to the grids.
 fn add_values(source: &mut dyn ByteSource, found: &Found, opened: &mut OpenedGrids) -> Result<(), ReadError> {
-    let mut numbers = numbers(source, found)?;
+    let (mut numbers, mut conditions) = (numbers(source, found)?, None);
     for (i, grid) in std::mem::take(&mut opened.grids).into_iter().enumerate() {
         let what = format!("solution of grid {}", i + 1);
         if found.layout.content == Content::Solution {
-            opened.notes.push(flow_conditions(&mut numbers, &what, i)?);
+            let now = flow_conditions(&mut numbers, &what)?;
+            if conditions != Some(now) {
+                let [mach, alpha, reynolds, time] = now;
+                opened.notes.push(GridNote::FlowConditions { grid: i, mach, alpha, reynolds, time });
+                conditions = Some(now);
+            }
         }
         let names = field_names(&found.layout, found.sizes.n_functions[i]);
         opened.grids.push(add_fields(&mut numbers, grid, names, &what)?);
@@ -154,14 +159,14 @@ fn add_values(source: &mut dyn ByteSource, found: &Found, opened: &mut OpenedGri
     Ok(())
 }
 
-fn flow_conditions(numbers: &mut Numbers, what: &str, grid: usize) -> Result<GridNote, ReadError> {
+/// Mach number, angle of attack, Reynolds number, and time.
+fn flow_conditions(numbers: &mut Numbers, what: &str) -> Result<[f64; 4], ReadError> {
     let n_record_bytes = numbers.n_bytes(4, 0);
     let mut conditions = [0.0; 4];
     numbers.mark(n_record_bytes, what)?;
     numbers.reals(4, what, &mut |i, v| conditions[i] = v)?;
     numbers.mark(n_record_bytes, what)?;
-    let [mach, alpha, reynolds, time] = conditions;
-    Ok(GridNote::FlowConditions { grid, mach, alpha, reynolds, time })
+    Ok(conditions)
 }
 
 fn field_names(layout: &Layout, n_functions: u32) -> Vec<String> {
