@@ -19,7 +19,8 @@ use crate::{
 
 /// Opens a volume: a file, or a folder of DICOM slices, of OME-Zarr, or of pictures.
 ///
-/// The format is told by content where it has a magic, else by extension.
+/// The format is told by content where it has a magic, else by extension. A structured grid is refused by name:
+/// [`open_grid`](crate::open_grid) opens it.
 ///
 /// # Errors
 /// One line that names the path, what is wrong, the value and the bound.

@@ -53,11 +53,8 @@ impl GridFormat {
 
     /// Whether [`open_grid`](crate::open_grid) in this build can read it.
     pub const fn is_readable(self) -> bool {
-        match self {
-            GridFormat::GeoTiff => cfg!(feature = "tiff"),
-            GridFormat::VtkXml => cfg!(feature = "vti"),
-            _ => true,
-        }
+        let has_tiff = cfg!(feature = "tiff") || !matches!(self, GridFormat::GeoTiff);
+        has_tiff && (cfg!(feature = "vti") || !matches!(self, GridFormat::VtkXml))
     }
 
     /// The format that the end of the file's name suggests.

@@ -19,7 +19,7 @@ use crate::{GridFormat, GridNote, GridOptions, OpenedGrids, ReadError};
 /// (0, 0) is the south-western one of most files. A node lies at the middle of its pixel, or at its corner where the file has
 /// `RasterPixelIsPoint`. Projected positions are the file's, in its unit ("m", "ft", "US survey ft"); degrees become metres as
 /// those of [`hgt`](super::hgt::read). The field is "elevation", its unit that of the vertical coordinates, if stated. Samples
-/// that equal `GDAL_NODATA` are holes.
+/// that equal `GDAL_NODATA` are holes, and those of strips or tiles that are not stored.
 ///
 /// # Errors
 /// As [`ReadError`] lists them: no place, or one that is no plane map; several pages or bands; samples beyond the limits.
@@ -39,7 +39,11 @@ fn read_from(source: &mut dyn ByteSource, options: &GridOptions) -> Result<Opene
     if band.n_missing > 0 {
         notes.push(GridNote::MissingChunks { n_missing: band.n_missing, n_chunks: band.n_chunks });
     }
-    let (values, holes) = with_voxels!(&band.samples, samples => nodes(samples, n_nodes, rows, no_data))?;
+    let (values, mut holes) = with_voxels!(&band.samples, samples => nodes(samples, n_nodes, rows, no_data))?;
+    for (j, row) in band.missing.chunks_exact(n_nodes.x as usize).enumerate() {
+        let start = rows.node_row(j, n_nodes) * n_nodes.x as usize;
+        holes[start..].iter_mut().zip(row).for_each(|(hole, is_missing)| *hole |= is_missing);
+    }
     let elevation = NodeField { name: "elevation".to_owned(), unit: keys.vertical_unit, values };
     let mut grid = StructuredGrid::new(n_nodes.extend(1), points)?.with_field(elevation)?;
     if holes.contains(&true) {
@@ -120,6 +124,16 @@ enum Rows {
     TurnedOver,
 }
 
+impl Rows {
+    /// The row of nodes of a row of samples, and the other way round.
+    fn node_row(self, row: usize, n_nodes: UVec2) -> usize {
+        match self {
+            Rows::AsStored => row,
+            Rows::TurnedOver => n_nodes.y as usize - 1 - row,
+        }
+    }
+}
+
 impl PixelMap {
     fn read(tags: &GeoTags, pixel_is_point: bool) -> Result<PixelMap, ReadError> {
         let GeoTags { pixel_scale, tiepoints, transformation, .. } = tags;
@@ -177,9 +191,8 @@ fn nodes<T: Scalar>(
     let is_float = matches!(T::TYPE, ScalarType::F32 | ScalarType::F64);
     let rounded = no_data.map(|value| (value, T::from_f64(value).to_f64()));
     let no_data = rounded.filter(|(value, rounded)| is_float || value == rounded).map(|(_, rounded)| rounded);
-    let n_rows = n_nodes.y as usize;
-    for j in 0..n_rows {
-        let row = if rows == Rows::TurnedOver { n_rows - 1 - j } else { j };
+    for j in 0..n_nodes.y as usize {
+        let row = rows.node_row(j, n_nodes);
         for sample in &samples[row * n_nodes.x as usize..][..n_nodes.x as usize] {
             let value = sample.to_f64();
             values.push(value as f32);

@@ -21,7 +21,7 @@ pub enum GridNote {
     /// Degrees became metres: `west` and `south` are where the grid's outermost nodes lie, `scale_latitude` is the one whose
     /// cosine scales longitudes.
     Degrees { west: f64, south: f64, scale_latitude: f64 },
-    /// Strips or tiles of a GeoTIFF that are not stored; their values are 0.
+    /// Strips or tiles of a GeoTIFF that are not stored; their nodes are holes.
     MissingChunks { n_missing: u64, n_chunks: u64 },
 }
 
@@ -50,7 +50,7 @@ impl fmt::Display for GridNote {
                 "degrees became metres from longitude {west}, latitude {south}; longitudes are those of latitude {scale_latitude}"
             ),
             GridNote::MissingChunks { n_missing, n_chunks } => {
-                write!(f, "{n_missing} of {n_chunks} strips or tiles are not stored; their values are 0")
+                write!(f, "{n_missing} of {n_chunks} strips or tiles are not stored; their nodes are holes")
             }
         }
     }

@@ -5,11 +5,12 @@ use std::io::Cursor;
 use brickfield_core::Voxels;
 use brickfield_core::glam::UVec2;
 
-use super::chunks::read_samples;
+use super::chunks::{read_samples, visit_missing};
 use super::files::OneFile;
 use super::page::Page;
 use crate::files::ByteSource;
 use crate::grids::check_nodes;
+use crate::numbers::with_room;
 use crate::pixel::Pixel;
 use crate::samples::{append_binary, room_for};
 use crate::{Limits, ReadError};
@@ -41,9 +42,11 @@ pub(crate) struct Elevations<'a> {
     pub(crate) tags: GeoTags,
 }
 
-/// The samples of a page, the northern row first in most files, and how many of its strips or tiles are not stored.
+/// The samples of a page, the northern row first in most files.
 pub(crate) struct BandSamples {
     pub(crate) samples: Voxels,
+    /// Which samples lie in strips or tiles that are not stored; empty if all are.
+    pub(crate) missing: Vec<bool>,
     pub(crate) n_missing: u64,
     pub(crate) n_chunks: u64,
 }
@@ -75,13 +78,28 @@ impl<'a> Elevations<'a> {
     pub(crate) fn read(mut self, limits: &Limits) -> Result<BandSamples, ReadError> {
         let stored = self.page.shape.stored;
         let n_unpacked = (stored.n_bytes() + stored.read_into().n_bytes()) as u128 * self.page.shape.n_pixels();
-        check_nodes(&[self.n_nodes().extend(1)], 5, n_unpacked, limits)?;
+        // A value, a hole, and a sample that is missing.
+        check_nodes(&[self.n_nodes().extend(1)], 6, n_unpacked, limits)?;
         let samples = read_samples(&mut self.file.tiff, &self.page, 0..1, 0, limits)?;
         let n = self.page.shape.n_pixels() as usize;
         let mut voxels = room_for(stored.read_into(), n)?;
         let name = self.page.name();
         append_binary(&mut voxels, &mut Cursor::new(samples.bytes), n, stored, samples.order, name)?;
-        Ok(BandSamples { samples: voxels, n_missing: samples.n_missing, n_chunks: samples.n_chunks })
+        let missing = if samples.n_missing > 0 { self.missing()? } else { Vec::new() };
+        Ok(BandSamples { samples: voxels, missing, n_missing: samples.n_missing, n_chunks: samples.n_chunks })
+    }
+
+    fn missing(&mut self) -> Result<Vec<bool>, ReadError> {
+        let (n, width) = (self.page.shape.n_pixels() as usize, self.page.shape.width as usize);
+        let mut missing = with_room(n)?;
+        missing.resize(n, false);
+        visit_missing(&mut self.file.tiff, &self.page, &mut |columns, rows| {
+            for row in rows {
+                let start = row as usize * width;
+                missing[start + columns.start as usize..start + columns.end as usize].fill(true);
+            }
+        })?;
+        Ok(missing)
     }
 }
 

@@ -8,8 +8,8 @@ use brickfield_io::{GridOptions, OpenedGrids, open_grid};
 use libtest_mimic::Failed;
 
 /// A file, and all that is known of it.
-pub struct RealGrid {
-    pub path: &'static str,
+pub(crate) struct RealGrid {
+    pub(crate) path: &'static str,
     solution: Option<&'static str>,
     n_nodes: [u32; 3],
     n_holes: usize,
@@ -23,7 +23,7 @@ pub struct RealGrid {
 }
 
 /// The real grids.
-pub const GRIDS: &[RealGrid] = &[
+pub(crate) const GRIDS: &[RealGrid] = &[
     RealGrid {
         path: "curvilinear/combxyz.bin",
         solution: Some("curvilinear/combq.bin"),
@@ -105,7 +105,7 @@ pub const GRIDS: &[RealGrid] = &[
 ];
 
 /// Opens the grid, and holds it against the table.
-pub fn is_as_expected(folder: &Path, path: &str) -> Result<(), Failed> {
+pub(crate) fn is_as_expected(folder: &Path, path: &str) -> Result<(), Failed> {
     let expected = GRIDS.iter().find(|grid| path.ends_with(grid.path)).ok_or("not in the table")?;
     let mut options = GridOptions::default();
     options.solution = expected.solution.map(|name| folder.join(name));

@@ -34,7 +34,7 @@ pub(super) fn find_grid(source: &mut dyn ByteSource, stated: &Plot3dLayout) -> R
         Ok([found]) => Ok(found),
         Err(several) if several.is_empty() => match find_only_values(source, length)? {
             Some(values) => {
-                let value = format!("a {} of {}", values.layout.content.name(), grids(&values.sizes));
+                let value = format!("{} of {}", values.layout.content.name(), grids(&values.sizes));
                 Err(ReadError::unsupported("PLOT3D file", value, "its grid is, with it as `solution`"))
             }
             None => Err(none_fits("length of the grid file", length, &candidates)),

@@ -4,7 +4,8 @@ use std::fmt;
 
 use crate::ByteOrder;
 
-/// The layout of PLOT3D files, as far as the caller knows it. What is `None` is found from the file's length.
+/// The layout of PLOT3D files, of the grid and of its solution, as far as the caller knows it. A `None` is found from the
+/// file's length.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Plot3dLayout {
@@ -64,8 +65,8 @@ pub(super) enum Content {
 impl Content {
     pub(super) fn name(self) -> &'static str {
         match self {
-            Content::Grid { .. } => "grid",
-            Content::Solution => "solution",
+            Content::Grid { .. } => "a grid",
+            Content::Solution => "a solution",
             Content::Functions => "functions",
         }
     }

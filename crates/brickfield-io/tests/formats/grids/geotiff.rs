@@ -126,6 +126,24 @@ fn no_data_is_a_hole_if_the_type_has_it() {
 }
 
 #[test]
+fn nodes_of_tiles_that_are_not_stored_are_holes() {
+    let samples: Vec<u8> = (0..20 * 18).map(|i| (i % 200) as u8 + 1).collect();
+    let page = placed(PageBytes::grey(20, 18, 8, samples), &UTM_AREA).tiled([20, 18, 1], [16, 16, 1], 1);
+    let page = page.packed(8, zlib);
+    let mut lengths: Vec<u64> = page.chunks.iter().map(|chunk| chunk.len() as u64).collect();
+    lengths[1] = 0;
+    let opened = read_page(with(page, 325, Values::Long(lengths))).unwrap();
+    let grid = &opened.grids[0];
+    assert_eq!(opened.notes, [GridNote::MissingChunks { n_missing: 1, n_chunks: 4 }]);
+    for j in 0..18 {
+        for i in 0..20 {
+            // Columns from 16 on, of the 16 northern rows.
+            assert_eq!(grid.holes().unwrap()[grid.number(UVec3::new(i, j, 0))], i >= 16 && j >= 2, "{i} {j}");
+        }
+    }
+}
+
+#[test]
 fn places_pages_and_bands_that_are_not_read_are_named() {
     let said = |page| read_page(page).unwrap_err().to_string();
     assert_eq!(
