@@ -4,9 +4,9 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::{fmt, io};
 
-use brickfield_core::{GridError, VolumeError};
+use brickfield_core::{GridError, StructuredGridError, VolumeError};
 
-use crate::Format;
+use crate::{Format, GridFormat};
 
 /// A file that could not be opened, and why.
 #[derive(Debug, thiserror::Error)]
@@ -35,12 +35,16 @@ pub enum ReadError {
     Empty,
     #[error("no known volume format; it starts with {found}")]
     UnknownFormat { found: Shown },
+    #[error("no known format of structured grids; it starts with {found}")]
+    UnknownGridFormat { found: Shown },
     #[error("no DICOM slices, no OME-Zarr metadata and no pictures among the {} of this folder", counted(*n_entries, "entry", "entries"))]
     UnknownFolder { n_entries: usize },
     #[error("not {format}: {what} is {found}, expected {expected}")]
     WrongMagic { format: Format, what: &'static str, found: Shown, expected: &'static str },
     #[error("{format} is left out of this build (cargo feature `{feature}`)")]
     FeatureOff { format: Format, feature: &'static str },
+    #[error("{format} is left out of this build (cargo feature `{feature}`)")]
+    GridFeatureOff { format: GridFormat, feature: &'static str },
     #[error("{field} is missing")]
     Missing { field: &'static str },
     #[error("{} is {value}; expected {}", one_line(field), one_line(expected))]
@@ -78,6 +82,8 @@ pub enum ReadError {
     DecoderPanicked { what: &'static str },
     #[error("{0}")]
     Grid(Box<GridError>),
+    #[error("{}", one_line(&.0.to_string()))]
+    StructuredGrid(Box<StructuredGridError>),
     #[error("{0}")]
     Volume(#[from] VolumeError),
 }
@@ -123,6 +129,12 @@ fn ends_within(n_file_bytes: u64, part: &str, end: Option<u64>) -> String {
 impl From<GridError> for ReadError {
     fn from(fault: GridError) -> ReadError {
         ReadError::Grid(Box::new(fault))
+    }
+}
+
+impl From<StructuredGridError> for ReadError {
+    fn from(fault: StructuredGridError) -> ReadError {
+        ReadError::StructuredGrid(Box::new(fault))
     }
 }
 

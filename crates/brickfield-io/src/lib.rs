@@ -14,6 +14,7 @@ mod files;
 mod folder;
 mod foreign;
 mod format;
+pub mod grids;
 #[cfg(any(feature = "dicom", feature = "ome-zarr", feature = "tiff", feature = "png", feature = "vti"))]
 mod guard;
 mod length_unit;
@@ -67,6 +68,7 @@ pub use choice::{Choice, ChoiceKind, WantedEntries};
 pub use error::{Damage, OpenError, ReadError, Shown};
 pub use files::{ByteSource, DataFiles, Folder, NoFiles};
 pub use format::Format;
+pub use grids::{GridFormat, GridNote, GridOptions, OpenedGrids, detect_grid, open_grid};
 pub use limits::Limits;
 pub use note::Note;
 pub use numbers::ByteOrder;

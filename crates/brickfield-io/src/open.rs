@@ -10,13 +10,17 @@ use crate::files::ByteSource;
 use crate::files::{open_regular, read_head};
 use crate::folder::visit_files;
 use crate::foreign::{ForeignFormat, after_user_block, foreign};
+use crate::grids::OPENED_BY;
+use crate::grids::plot3d::is_plot3d;
 use crate::{
-    Folder, Format, Note, OpenError, OpenOptions, Opened, RawSpec, ReadError, metaimage, nrrd, raw, vtk_legacy,
+    Folder, Format, GridFormat, Note, OpenError, OpenOptions, Opened, RawSpec, ReadError, metaimage, nrrd, raw,
+    vtk_legacy,
 };
 
 /// Opens a volume: a file, or a folder of DICOM slices, of OME-Zarr, or of pictures.
 ///
-/// The format is told by content where it has a magic, else by extension.
+/// The format is told by content where it has a magic, else by extension. A structured grid is refused by name:
+/// [`open_grid`](crate::open_grid) opens it.
 ///
 /// # Errors
 /// One line that names the path, what is wrong, the value and the bound.
@@ -89,9 +93,18 @@ fn detect_file(path: &Path) -> Result<Format, ReadError> {
         }
         None => match after_user_block(&mut file, path)? {
             Some(ForeignFormat { name, hint }) => Err(ReadError::unsupported("format", name, hint)),
-            None => Format::from_extension(path).ok_or(ReadError::UnknownFormat { found: Shown::of_bytes(&head) }),
+            None => match Format::from_extension(path) {
+                Some(Format::Raw) if is_plot3d(&mut file)? => Err(grid_of(GridFormat::Plot3d)),
+                Some(format) => Ok(format),
+                None => Err(GridFormat::from_extension(path)
+                    .map_or(ReadError::UnknownFormat { found: Shown::of_bytes(&head) }, grid_of)),
+            },
         },
     }
+}
+
+fn grid_of(format: GridFormat) -> ReadError {
+    ReadError::unsupported("format", format, OPENED_BY)
 }
 
 /// The first bytes inside a gzip wrapper, if there is one.

@@ -222,7 +222,8 @@ pub(crate) fn skip_text(reader: &mut dyn BufRead, n: usize, what: &str) -> Resul
 
 const MAX_TOKEN_BYTES: usize = 400;
 
-fn next_token(reader: &mut dyn BufRead, token: &mut Vec<u8>) -> std::io::Result<()> {
+/// The next word, white space and commas left out; empty at the end. A word that is too long for a number comes in parts.
+pub(crate) fn next_token(reader: &mut dyn BufRead, token: &mut Vec<u8>) -> std::io::Result<()> {
     let separates = |b: &u8| b.is_ascii_whitespace() || *b == b',';
     token.clear();
     loop {

@@ -13,7 +13,7 @@ use crate::placement::{AXES, GridPlacement, usable_spacing};
 use crate::samples::append_binary;
 use crate::stored_type::StoredType;
 use crate::stored_voxel::StoredVoxel;
-use crate::{ByteOrder, ChoiceKind, Note, ReadError};
+use crate::{ByteOrder, ChoiceKind, GridNote, Note, ReadError};
 
 /// Whether values belong to the points of the grid or to its cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,6 +129,29 @@ pub(crate) fn choose(arrays: &[&VtkArray], found: &mut FileFacts) -> Result<Opti
     let names = arrays.iter().map(|a| a.name.clone()).collect();
     let chosen = found.choose_or(ChoiceKind::Array, Entries::Named(names), preferred as u64)?;
     Ok(Some(chosen as usize))
+}
+
+/// VTK's array of marks of points or cells (vtkDataSetAttributes.h).
+pub(crate) const GHOSTS: &str = "vtkGhostType";
+
+/// Notes the arrays of cells of a grid.
+///
+/// # Errors
+/// Values of cells only: means at nodes would be other values than the file's.
+pub(crate) fn only_points<'a>(
+    arrays: impl Iterator<Item = &'a VtkArray>,
+    notes: &mut Vec<GridNote>,
+) -> Result<(), ReadError> {
+    let (of_points, of_cells): (Vec<_>, Vec<_>) = arrays.partition(|array| array.support == Support::Points);
+    let names: Vec<_> = of_cells.iter().map(|array| array.name.clone()).collect();
+    if of_points.is_empty() && names.iter().any(|name| name != GHOSTS) {
+        let supported = "those of points are: bring cell data to points first (ParaView: Cell Data to Point Data)";
+        return Err(ReadError::unsupported("arrays of cells only,", names.join(", "), supported));
+    }
+    if !names.is_empty() {
+        notes.push(GridNote::CellDataLeftOut { names });
+    }
+    Ok(())
 }
 
 /// Where the points of an image lie.

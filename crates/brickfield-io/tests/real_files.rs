@@ -7,6 +7,9 @@ use brickfield_io::{OpenOptions, Opened, open};
 use libtest_mimic::{Arguments, Failed, Trial};
 use serde_json::Value;
 
+#[path = "real_files/grids.rs"]
+mod grids;
+
 fn main() {
     let folder = std::env::var_os("BRICKFIELD_DATA").filter(|f| !f.is_empty()).map(PathBuf::from);
     let trial = |name: &str, test: fn(&Path, &str) -> Result<(), Failed>| {
@@ -18,7 +21,8 @@ fn main() {
     let files = FILES.iter().map(|file| trial(file.0, is_what_the_manifest_says));
     let foreign = FOREIGN.iter().map(|file| trial(file.0, is_refused_by_name));
     let halves = HALVES.iter().map(|file| trial(&format!("{HALF}{}", file.0), half_of_it_says_how_much_came));
-    let trials = files.chain(foreign).chain(halves).collect();
+    let grids = grids::GRIDS.iter().map(|grid| trial(grid.path, grids::is_as_expected));
+    let trials = files.chain(foreign).chain(halves).chain(grids).collect();
     libtest_mimic::run(&Arguments::from_args(), trials).exit();
 }
 

@@ -181,6 +181,22 @@ pub(super) fn read_samples(
     Ok(samples)
 }
 
+/// Visits the samples of strips or tiles that are not stored: columns and rows of the page.
+pub(super) fn visit_missing(
+    file: &mut TiffFile,
+    page: &Page,
+    visit: &mut dyn FnMut(Range<u64>, Range<u64>),
+) -> Result<(), ReadError> {
+    let chunks = Chunks::read(file, page)?;
+    for i in chunks.numbers_with(&(0..1)).filter(|i| Stored::find(&chunks, *i, 0).is_missing(page)) {
+        let Chunk { first, dims, .. } = chunks.chunk(i, page);
+        let [columns, rows] = [(0, page.shape.width), (1, page.shape.height)]
+            .map(|(axis, n)| first[axis]..(first[axis] + dims[axis]).min(n.into()));
+        visit(columns, rows);
+    }
+    Ok(())
+}
+
 impl PageSamples {
     /// Takes the samples of a chunk, or that it is not stored.
     fn add(
@@ -247,6 +263,11 @@ impl Stored {
         Stored { start: start.saturating_add(shift), n_bytes: chunks.lengths.get(i as usize).copied() }
     }
 
+    fn is_missing(self, page: &Page) -> bool {
+        let is_plain = page.compression == PageCompression::None;
+        self.start == 0 || (self.n_bytes == Some(0) && !is_plain)
+    }
+
     /// The samples, each of whole bytes, and their order; nothing where they are not stored.
     fn decode(
         self,
@@ -256,8 +277,7 @@ impl Stored {
         jpeg_tables: &[u8],
         limits: &Limits,
     ) -> Result<Option<(Vec<u8>, ByteOrder)>, ReadError> {
-        let is_plain = page.compression == PageCompression::None;
-        if self.start == 0 || (self.n_bytes == Some(0) && !is_plain) {
+        if self.is_missing(page) {
             return Ok(None);
         }
         let what = || format!("a strip or tile of {}", page.name());

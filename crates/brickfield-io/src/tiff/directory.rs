@@ -164,6 +164,13 @@ impl<'a> TiffFile<'a> {
         Ok(value.filter(|v| v.is_finite() && *v > 0.0))
     }
 
+    /// All numbers of a tag of 64-bit floats; none where it is missing or has values of another kind.
+    pub(super) fn doubles(&mut self, directory: &Directory, tag: u16) -> Result<Vec<f64>, ReadError> {
+        let Some(entry) = directory.find(tag).filter(|e| e.kind == 12) else { return Ok(Vec::new()) };
+        let bytes = self.bytes_of(&entry, &directory.page)?;
+        Ok(bytes.chunks_exact(8).map(|value| f64::from_bits(number(value, self.order))).collect())
+    }
+
     /// The bytes of a tag, whatever their kind; empty where it is missing.
     pub(super) fn bytes(&mut self, directory: &Directory, tag: u16) -> Result<Vec<u8>, ReadError> {
         directory.find(tag).map_or(Ok(Vec::new()), |entry| self.bytes_of(&entry, &directory.page))

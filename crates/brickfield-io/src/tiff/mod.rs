@@ -6,6 +6,7 @@
 
 mod chunks;
 mod directory;
+mod elevation;
 mod files;
 mod imagej;
 mod ome;
@@ -29,6 +30,7 @@ use crate::pixel::{KeptSamples, PictureShape, PixelPart};
 use crate::placement::GridPlacement;
 use crate::samples::{allocate, append_zeros};
 use crate::{ChoiceKind, Format, Limits, Note, OpenOptions, Opened, ReadError};
+pub(crate) use elevation::{Elevations, GeoTags};
 use files::{OneFile, Plane, SUB_IFDS, StackFiles};
 use page::Page;
 pub(crate) use slice::{TiffSlice, names_other_files};

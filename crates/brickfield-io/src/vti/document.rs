@@ -35,18 +35,49 @@ pub(super) struct Array {
     offset: u64,
 }
 
+/// What a document is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Dataset {
+    Image,
+    Rectilinear,
+    Structured,
+}
+
+impl Dataset {
+    /// The name of a structured grid in files; an image has none here.
+    pub(super) fn name_of_grid(self) -> Option<&'static str> {
+        match self {
+            Dataset::Image => None,
+            Dataset::Rectilinear => Some("RectilinearGrid"),
+            Dataset::Structured => Some("StructuredGrid"),
+        }
+    }
+}
+
+/// What the arrays inside an element are.
+#[derive(Clone, Debug)]
+pub(super) enum Around {
+    /// Values; the name of the active scalars.
+    Data(Support, Option<String>),
+    /// Where the points of a grid lie.
+    Geometry,
+}
+
 /// A box of the image, in this file or in another one.
 #[derive(Clone, Debug)]
 pub(super) struct Piece {
     /// First and last point along x, y, z.
     pub(super) extent: [i64; 6],
     pub(super) arrays: Vec<Array>,
+    /// Arrays of Points or Coordinates.
+    pub(super) geometry: Vec<Array>,
     /// The file that holds it (.pvti).
     pub(super) source: Option<String>,
 }
 
 #[derive(Clone, Debug)]
 pub(super) struct Document {
+    pub(super) dataset: Dataset,
     pub(super) order: ByteOrder,
     pub(super) word: WordSize,
     pub(super) compressor: Option<Compressor>,
@@ -58,8 +89,8 @@ pub(super) struct Document {
     /// The arrays that all pieces of a .pvti have.
     declared: Vec<Array>,
     pub(super) appended: Option<(ArrayStorage, u64)>,
-    /// What the element around an array says: its support, and the name of its active scalars.
-    pub(super) around: Option<(Support, Option<String>)>,
+    /// The element around an array.
+    pub(super) around: Option<Around>,
     /// The length of a file that ends before its root element does.
     pub(super) cut_off_at: Option<u64>,
 }
@@ -103,9 +134,15 @@ impl Document {
 
     pub(super) fn of_root(e: &BytesStart) -> Result<Document, ReadError> {
         let kind = attribute(e, "type")?.unwrap_or_default();
-        if !matches!(kind.as_str(), "ImageData" | "PImageData") {
-            return Err(ReadError::unsupported("VTKFile type", kind, "ImageData and PImageData are"));
-        }
+        let dataset = match kind.as_str() {
+            "ImageData" | "PImageData" => Dataset::Image,
+            "RectilinearGrid" => Dataset::Rectilinear,
+            "StructuredGrid" => Dataset::Structured,
+            "PRectilinearGrid" | "PStructuredGrid" => {
+                return Err(ReadError::unsupported("VTKFile type", kind, "the grids that it names are, one by one"));
+            }
+            _ => return Err(ReadError::unsupported("VTKFile type", kind, "ImageData and PImageData are")),
+        };
         let order = match attribute(e, "byte_order")?.as_deref() {
             Some("LittleEndian") | None => ByteOrder::Little,
             Some("BigEndian") => ByteOrder::Big,
@@ -117,6 +154,7 @@ impl Document {
             Some(other) => return Err(ReadError::field("header_type", other, "UInt32 or UInt64")),
         };
         Ok(Document {
+            dataset,
             order,
             word,
             compressor: attribute(e, "compressor")?.as_deref().map_or(Ok(None), Compressor::named)?,
@@ -141,24 +179,25 @@ impl Document {
 
     pub(super) fn enter_piece(&mut self, e: &BytesStart) -> Result<(), ReadError> {
         let extent = several(e, "Extent")?.unwrap_or(self.geometry.extent);
-        self.pieces.push(Piece { extent, arrays: Vec::new(), source: attribute(e, "Source")? });
+        self.pieces.push(Piece { extent, arrays: Vec::new(), geometry: Vec::new(), source: attribute(e, "Source")? });
         Ok(())
     }
 
     pub(super) fn enter_array(&mut self, e: &BytesStart, position: u64) -> Result<(), ReadError> {
-        let arrays = match self.pieces.last_mut() {
-            Some(piece) => &mut piece.arrays,
-            None => &mut self.declared,
+        let (arrays, support, active) = match (&self.around, self.pieces.last_mut()) {
+            (Some(Around::Data(support, active)), Some(piece)) => (&mut piece.arrays, *support, active.as_ref()),
+            (Some(Around::Data(support, active)), None) => (&mut self.declared, *support, active.as_ref()),
+            (Some(Around::Geometry), Some(piece)) => (&mut piece.geometry, Support::Points, None),
+            _ => return Ok(()),
         };
-        let Some((support, active)) = &self.around else { return Ok(()) };
         let (name, type_name) = (attribute(e, "Name")?.unwrap_or_default(), attribute(e, "type")?.unwrap_or_default());
         let n_components = integer(e, "NumberOfComponents")?.unwrap_or(1);
         let about = VtkArray {
             sample: sample(&type_name),
-            support: *support,
+            support,
             n_components,
             component_names: component_names(e, n_components)?,
-            is_active: active.as_ref() == Some(&name),
+            is_active: active == Some(&name),
             name,
             type_name,
         };

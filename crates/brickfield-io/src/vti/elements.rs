@@ -7,7 +7,7 @@ use quick_xml::errors::SyntaxError;
 use quick_xml::events::{BytesStart, Event};
 
 use super::attributes::attribute;
-use super::document::{ArrayStorage, Document};
+use super::document::{Around, ArrayStorage, Document};
 use super::metered::{Metered, ends_within_document, find_underscore, skip_text};
 use crate::error::Shown;
 use crate::files::{ByteSource, n_bytes_left, read_head};
@@ -124,10 +124,11 @@ fn element(document: &mut Option<Document>, e: &BytesStart, position: u64) -> Re
         return Ok(Next::Go);
     };
     match name.as_ref() {
-        "ImageData" | "PImageData" => document.enter_image(e)?,
+        "ImageData" | "PImageData" | "RectilinearGrid" | "StructuredGrid" => document.enter_image(e)?,
         "Piece" => document.enter_piece(e)?,
-        "PointData" | "PPointData" => document.around = Some((Support::Points, attribute(e, "Scalars")?)),
-        "CellData" | "PCellData" => document.around = Some((Support::Cells, attribute(e, "Scalars")?)),
+        "PointData" | "PPointData" => document.around = Some(Around::Data(Support::Points, attribute(e, "Scalars")?)),
+        "CellData" | "PCellData" => document.around = Some(Around::Data(Support::Cells, attribute(e, "Scalars")?)),
+        "Points" | "Coordinates" => document.around = Some(Around::Geometry),
         "DataArray" | "PDataArray" => {
             document.enter_array(e, position)?;
             return Ok(Next::SkipText);
@@ -148,7 +149,7 @@ fn appended(e: &BytesStart) -> Result<Next, ReadError> {
 
 fn end(document: &mut Option<Document>, name: &str) -> Next {
     if let Some(document) = document
-        && matches!(name, "PointData" | "CellData" | "PPointData" | "PCellData")
+        && matches!(name, "PointData" | "CellData" | "PPointData" | "PCellData" | "Points" | "Coordinates")
     {
         document.around = None;
     }

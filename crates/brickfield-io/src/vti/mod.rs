@@ -8,6 +8,7 @@ mod blocks;
 mod compressor;
 mod document;
 mod elements;
+mod grids;
 mod inline;
 mod metered;
 mod pieces;
@@ -18,6 +19,7 @@ use brickfield_core::Voxels;
 
 use crate::error::check_length;
 use crate::files::{ByteSource, DataFiles, n_bytes_left, open_named, stays_within};
+use crate::grids::OPENED_BY;
 use crate::guard::guarded;
 use crate::limits::CheckedShape;
 use crate::opened::FileFacts;
@@ -27,6 +29,7 @@ use crate::{Format, OpenOptions, Opened, ReadError};
 use blocks::{WordReader, check_plain, read_blocks};
 use document::{Array, ArrayStorage, Document, Piece};
 use elements::read_document;
+pub(crate) use grids::read_grids;
 use inline::{Base64Reader, UntilTag};
 use pieces::Assembly;
 
@@ -43,6 +46,9 @@ pub fn read(mut input: impl BufRead + Seek, files: &dyn DataFiles, options: &Ope
 
 fn read_from(source: &mut dyn ByteSource, files: &dyn DataFiles, options: &OpenOptions) -> Result<Opened, ReadError> {
     let document = read_document(source)?;
+    if let Some(name) = document.dataset.name_of_grid() {
+        return Err(ReadError::unsupported("VTKFile type", name, OPENED_BY));
+    }
     let mut found = FileFacts::plain(Format::Vti, options);
     let arrays = document.arrays();
     let chosen = choose(&arrays, &mut found)?;
@@ -111,6 +117,9 @@ fn read_pieces(
 
 fn read_piece_file(file: &mut dyn ByteSource, about: &VtkArray, assembly: &mut Assembly) -> Result<(), ReadError> {
     let document = read_document(file)?;
+    if let Some(name) = document.dataset.name_of_grid() {
+        return Err(ReadError::unsupported("VTKFile type", name, "ImageData is, of a piece"));
+    }
     match document.is_parallel {
         true => Err(ReadError::unsupported("VTKFile type", "PImageData", "ImageData is, of a piece")),
         false => put_pieces(file, &document, about, assembly),

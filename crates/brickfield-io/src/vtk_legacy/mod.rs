@@ -2,6 +2,8 @@
 //!
 //! Versions 1.0 to 5.1, as text and binary (big endian). Not: other data sets, strings, text and binary mixed.
 
+mod dataset;
+mod grids;
 mod sections;
 mod shares;
 mod types;
@@ -17,6 +19,8 @@ use crate::opened::FileFacts;
 use crate::samples::{allocate, append_text, least_text_bytes};
 use crate::vtk_arrays::{choose, dims};
 use crate::{ByteOrder, Format, OpenOptions, Opened, ReadError};
+use dataset::Wanted;
+pub(crate) use grids::read_grid;
 use sections::{Sections, StoredArray};
 use shares::Shares;
 
@@ -33,7 +37,7 @@ pub fn read(mut input: impl BufRead + Seek, options: &OpenOptions) -> Result<Ope
 }
 
 fn read_from(source: &mut dyn ByteSource, options: &OpenOptions) -> Result<Opened, ReadError> {
-    let sections = Sections::read(source)?;
+    let sections = Sections::read(source, Wanted::Image)?;
     let mut found = FileFacts::plain(Format::VtkLegacy, options);
     let arrays: Vec<_> = sections.arrays.iter().map(|array| &array.about).collect();
     let chosen =

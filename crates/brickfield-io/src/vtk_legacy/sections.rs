@@ -4,6 +4,7 @@ use std::str::FromStr;
 
 use brickfield_core::ScalarType;
 
+use super::dataset::{Dataset, Wanted};
 use super::types::{decoded, sample};
 use crate::error::check_length;
 use crate::files::{ByteSource, n_bytes_left};
@@ -29,6 +30,12 @@ impl StoredArray {
 }
 
 pub(super) struct Sections {
+    wanted: Wanted,
+    pub(super) dataset: Dataset,
+    /// X_COORDINATES, Y_COORDINATES and Z_COORDINATES, or POINTS.
+    pub(super) points: Vec<StoredArray>,
+    /// BLANKING: 0 for points that are left out.
+    pub(super) blanking: Option<StoredArray>,
     pub(super) is_binary: bool,
     pub(super) geometry: ImageGeometry,
     pub(super) arrays: Vec<StoredArray>,
@@ -38,7 +45,7 @@ pub(super) struct Sections {
 }
 
 impl Sections {
-    pub(super) fn read(source: &mut dyn ByteSource) -> Result<Sections, ReadError> {
+    pub(super) fn read(source: &mut dyn ByteSource, wanted: Wanted) -> Result<Sections, ReadError> {
         let first = HeaderLines::new(source).next_line()?.unwrap_or_default();
         if !first.starts_with("# vtk DataFile") {
             return Err(ReadError::wrong_start(Format::VtkLegacy, first.as_bytes(), "# vtk DataFile Version"));
@@ -50,8 +57,17 @@ impl Sections {
             "binary" => true,
             _ => return Err(ReadError::field("line 3", storage, "ASCII or BINARY")),
         };
-        let geometry = ImageGeometry::default();
-        let mut sections = Sections { is_binary, geometry, arrays: Vec::new(), has_dimensions: false, around: None };
+        let mut sections = Sections {
+            wanted,
+            dataset: Dataset::Image,
+            points: Vec::new(),
+            blanking: None,
+            is_binary,
+            geometry: ImageGeometry::default(),
+            arrays: Vec::new(),
+            has_dimensions: false,
+            around: None,
+        };
         while let Some(line) = next_line(source)? {
             sections.section(source, &line)?;
         }
@@ -64,7 +80,10 @@ impl Sections {
     fn section(&mut self, source: &mut dyn ByteSource, line: &str) -> Result<(), ReadError> {
         let words = Words(line.split_whitespace().collect());
         match words.keyword().as_str() {
-            "dataset" => check_dataset(&words),
+            "dataset" => self.enter_dataset(&words),
+            "x_coordinates" | "y_coordinates" | "z_coordinates" => self.enter_points(source, &words, 1),
+            "points" => self.enter_points(source, &words, 3),
+            "blanking" => self.enter_blanking(source, &words),
             "dimensions" => self.enter_dimensions(&words),
             "extent" => {
                 self.geometry.extent = words.numbers("EXTENT")?;
@@ -80,6 +99,26 @@ impl Sections {
             "lookup_table" => self.skip_table(source, &words),
             _ => self.read_attribute(source, &words),
         }
+    }
+
+    fn enter_dataset(&mut self, words: &Words) -> Result<(), ReadError> {
+        self.dataset = Dataset::of_name(words.get(1), self.wanted)?;
+        Ok(())
+    }
+
+    fn enter_points(&mut self, source: &mut dyn ByteSource, words: &Words, n_components: u64) -> Result<(), ReadError> {
+        let n_points = words.number(1, "number of coordinates or POINTS")?;
+        let about = array(words.get(0), words.get(2), Support::Points, n_components);
+        let array = self.pass(source, about, n_points, false)?;
+        self.points.push(array);
+        Ok(())
+    }
+
+    fn enter_blanking(&mut self, source: &mut dyn ByteSource, words: &Words) -> Result<(), ReadError> {
+        let n_points = words.number(1, "size of BLANKING")?;
+        let about = array("BLANKING", words.get(2), Support::Points, 1);
+        self.blanking = Some(self.pass(source, about, n_points, false)?);
+        Ok(())
     }
 
     fn enter_dimensions(&mut self, words: &Words) -> Result<(), ReadError> {
@@ -98,7 +137,7 @@ impl Sections {
     fn read_attribute(&mut self, source: &mut dyn ByteSource, words: &Words) -> Result<(), ReadError> {
         let keyword = words.keyword();
         let Some((support, n_voxels)) = self.around else {
-            let supported = "before POINT_DATA and CELL_DATA, those of STRUCTURED_POINTS are";
+            let supported = "before POINT_DATA and CELL_DATA, those of STRUCTURED_POINTS and grids are";
             return Err(ReadError::unsupported("section", words.get(0), supported));
         };
         let n_components: u64 = match keyword.as_str() {
@@ -204,13 +243,6 @@ fn array(name: &str, type_name: &str, support: Support, n_components: u64) -> Vt
         n_components,
         component_names: Vec::new(),
         is_active: false,
-    }
-}
-
-fn check_dataset(words: &Words) -> Result<(), ReadError> {
-    match words.get(1).eq_ignore_ascii_case("structured_points") {
-        true => Ok(()),
-        false => Err(ReadError::unsupported("DATASET", words.get(1), "STRUCTURED_POINTS is")),
     }
 }
 

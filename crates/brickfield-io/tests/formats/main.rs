@@ -15,6 +15,7 @@ mod dicom_file;
 mod dicom_frames;
 #[cfg(feature = "dicom")]
 mod dicom_series;
+mod grids;
 mod metaimage;
 #[cfg(feature = "mgh")]
 mod mgh;

@@ -47,6 +47,18 @@ fn seeds_for_fuzzing() {
     for (i, file) in crate::metaimage::examples().iter().enumerate() {
         write(folder, "metaimage", &format!("{i}.mha"), file.as_bytes());
     }
+    for example in crate::grids::examples() {
+        let (_, extension) = example.name.rsplit_once('.').unwrap_or_default();
+        let target = match extension {
+            "xyz" => "plot3d",
+            "q" | "f" => "plot3d_values",
+            "dem" => "usgs_dem",
+            "tif" => "geotiff",
+            "vtk" => "vtk_legacy_grid",
+            _ => "vtk_xml_grid",
+        };
+        write(folder, target, example.name, &example.bytes);
+    }
     #[cfg(feature = "ome-zarr")]
     for (i, entries) in crate::ome_zarr::examples().iter().chain(&crate::zarr_arrays::examples()).enumerate() {
         write(folder, "ome_zarr", &i.to_string(), &packed(entries));

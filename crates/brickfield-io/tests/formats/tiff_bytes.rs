@@ -12,6 +12,7 @@ pub(crate) enum Values {
     Text(Vec<u8>),
     /// Rational.
     Fraction(u32, u32),
+    Double(Vec<f64>),
 }
 
 /// A page: its tags, its strips or tiles, and the pages inside it.
@@ -188,6 +189,10 @@ impl Out {
             Values::Fraction(n, d) => {
                 [n, d].into_iter().for_each(|v| bytes.number((*v).into(), 4));
                 (5, 1)
+            }
+            Values::Double(v) => {
+                v.iter().for_each(|v| bytes.number(v.to_bits(), 8));
+                (12, v.len())
             }
         };
         let mut field = bytes.bytes;

@@ -167,9 +167,14 @@ fn files_that_lie() {
         assert!(file.contains(from), "{from}");
         read(file.replace(from, to).as_bytes()).unwrap_err().to_string()
     };
-    for dataset in ["UNSTRUCTURED_GRID", "RECTILINEAR_GRID", "STRUCTURED_GRID", "POLYDATA"] {
-        let expected = format!("DATASET {dataset:?} is not supported; STRUCTURED_POINTS is");
-        assert_eq!(said("STRUCTURED_POINTS", dataset), expected);
+    let grid = "it is a structured grid, which `open_grid` opens";
+    for (dataset, hint) in [
+        ("UNSTRUCTURED_GRID", "STRUCTURED_POINTS is"),
+        ("POLYDATA", "STRUCTURED_POINTS is"),
+        ("RECTILINEAR_GRID", grid),
+        ("STRUCTURED_GRID", grid),
+    ] {
+        assert_eq!(said("STRUCTURED_POINTS", dataset), format!("DATASET {dataset:?} is not supported; {hint}"));
     }
     assert_eq!(
         said("short 1", "string 1"),
