@@ -7,9 +7,9 @@ use clap::Args;
 use super::{OptionError, values};
 use crate::Scene;
 
-/// Light on surfaces.
+/// A light, and how surfaces throw it back.
 #[derive(Args, Clone, Debug)]
-pub struct LightOptions {
+pub struct LightSourceOptions {
     /// Light on surfaces from: head (the eye), X,Y,Z (the direction towards it, in the world) or place=X,Y,Z (its place in the world)
     #[arg(long, value_name = "FROM", value_parser = values::light, allow_hyphen_values = true)]
     pub light: Option<LightSource>,
@@ -25,6 +25,14 @@ pub struct LightOptions {
     /// The exponent of highlights, 1 to 255: the greater, the smaller they are
     #[arg(long, value_name = "N", requires = "light", default_value_t = LightTerms::default().shininess)]
     pub shininess: u32,
+}
+
+/// Light on the surfaces in a volume.
+#[derive(Args, Clone, Debug)]
+pub struct LightOptions {
+    /// Where it comes from.
+    #[command(flatten)]
+    pub source: LightSourceOptions,
     /// The gradient of a surface, in data values per world unit: where it is far lower there is no surface to be lit; a 64th of the
     /// volume's range of values in its least spacing unless stated
     #[arg(long, value_name = "GRADIENT", requires = "light", allow_hyphen_values = true)]
@@ -37,6 +45,18 @@ pub struct LightOptions {
     #[arg(long, value_name = "WHICH", requires = "light", requires_ifs([("stored", "blocks"), ("surface", "blocks")]),
           default_value = "central", value_parser = values::normals)]
     pub normals: Normals,
+}
+
+impl LightSourceOptions {
+    /// The light that is asked for; a gradient of `flat_below` is a surface's.
+    ///
+    /// # Errors
+    /// Numbers that make no light.
+    pub fn light(&self, flat_below: f64) -> Result<Option<Light>, LightError> {
+        let LightSourceOptions { light, ambient, diffuse, specular, shininess } = *self;
+        let terms = LightTerms { ambient, diffuse, specular, shininess };
+        light.map(|source| Light::new(source, terms, flat_below)).transpose()
+    }
 }
 
 impl LightOptions {
@@ -57,15 +77,8 @@ impl LightOptions {
         Ok(Scene { light: self.light(flat_below(range, grid.spacing().min_element()))?, ..scene })
     }
 
-    /// The light that is asked for; `flat_below` is the gradient of a surface unless one is stated.
-    ///
-    /// # Errors
-    /// Numbers that make no light.
-    pub fn light(&self, flat_below: f64) -> Result<Option<Light>, LightError> {
-        let Some(source) = self.light else { return Ok(None) };
-        let LightOptions { ambient, diffuse, specular, shininess, .. } = *self;
-        let terms = LightTerms { ambient, diffuse, specular, shininess };
-        let light = Light::new(source, terms, self.flat_below.unwrap_or(flat_below))?;
-        Ok(Some(light.on_sides(self.lit_sides).on_normals(self.normals)))
+    fn light(&self, flat_below: f64) -> Result<Option<Light>, LightError> {
+        let light = self.source.light(self.flat_below.unwrap_or(flat_below))?;
+        Ok(light.map(|light| light.on_sides(self.lit_sides).on_normals(self.normals)))
     }
 }

@@ -21,7 +21,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 pub use blocks::{BlockArgs, BlockSubject, Blocks};
-pub use light::LightOptions;
+pub use light::{LightOptions, LightSourceOptions};
 pub use sampling::{FinestVoxels, SamplingOptions};
 
 #[cfg(feature = "formats")]

@@ -24,8 +24,8 @@ use brickfield::core::glam::UVec2;
 use brickfield::curvilinear::GridPlane;
 use brickfield::io::{Limits, SAVED_EXTENSIONS};
 use brickfield::options::{
-    Background, BlockArgs, Boxes, InputOptions, LightOptions, OptionError, SamplingOptions, TreeOptions, ViewOptions,
-    values,
+    Background, BlockArgs, Boxes, InputOptions, LightOptions, LightSourceOptions, OptionError, SamplingOptions,
+    TreeOptions, ViewOptions, values,
 };
 use brickfield::overlay::LEVEL_COLORS;
 use brickfield::{AdapterInfo, BackendError, BackendStatus, SurfaceNormals, Trimming, Viewpoint, backends};
@@ -249,7 +249,7 @@ struct SurfaceArgs {
     #[arg(long)]
     gouraud: bool,
     #[command(flatten)]
-    light: LightOptions,
+    light: LightSourceOptions,
     /// Normals of the surface: grid (of its finest zones, whatever is drawn) or triangles (each is a plane)
     #[arg(long, value_name = "WHICH", default_value = "grid", value_parser = values::surface_normals)]
     normals: SurfaceNormals,

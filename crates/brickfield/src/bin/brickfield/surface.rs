@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use brickfield::core::glam::{DVec3, UVec3};
+use brickfield::core::glam::{DMat3, DVec3, UVec3};
 use brickfield::core::{Aabb, Camera, Grid, GridPoints, NodeField, StructuredGrid, TransferFunction, ValueRange};
 use brickfield::curvilinear::{BudgetSelector, CurvilinearGrid, GridPlane, QuadTree, Selection, SizeSelector, View};
 use brickfield::frame::{Coloring, MeshFrame, MeshLines, MeshPlan, MeshView};
@@ -31,7 +31,7 @@ enum SurfaceFault {
 pub(crate) fn run(args: &SurfaceArgs) -> Result<(), Failure> {
     check_picture_path(&args.out).map_err(Failure::usage)?;
     args.camera.check().map_err(OptionError::from)?;
-    args.light.check()?;
+    let light = args.light.light(1.0).map_err(OptionError::from)?;
     let mut backend = args.backend.open()?;
     let subject = Subject::open(args)?;
     let camera =
@@ -43,7 +43,7 @@ pub(crate) fn run(args: &SurfaceArgs) -> Result<(), Failure> {
         size: args.size,
         colors: subject.colors.clone(),
         coloring: if args.gouraud { Coloring::Gouraud } else { Coloring::Values },
-        light: args.light.light(1.0).map_err(OptionError::from)?,
+        light,
         lines: args.lines.map(|width| MeshLines { width, color: [0.0; 3] }),
     };
     let plan = MeshPlan::new(mesh, view).map_err(Failure::usage)?;
@@ -94,8 +94,7 @@ impl Subject {
     fn box_grid(&self) -> Grid {
         let Aabb { min, max } = self.tree.extent(self.tree.layout().root());
         let size = (max - min).max(DVec3::splat((max - min).max_element() * 1e-6)).max(DVec3::splat(f64::MIN_POSITIVE));
-        let first_sample = min + 0.5 * size;
-        Grid::from_first_sample(UVec3::ONE, first_sample, brickfield::core::glam::DMat3::from_diagonal(size))
+        Grid::from_first_sample(UVec3::ONE, size, min + 0.5 * size, DMat3::IDENTITY)
             .expect("a box of a surface has a size")
     }
 
