@@ -20,3 +20,4 @@ pub mod saladi;
 pub mod tong;
 pub mod turns;
 pub mod volumes;
+pub mod wynn;

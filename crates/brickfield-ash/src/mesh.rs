@@ -14,6 +14,9 @@ impl MeshBackend for AshBackend {
     fn render_mesh(&mut self, plan: &MeshPlan) -> Result<MeshFrame, RenderError> {
         self.check_size(plan.size())?;
         check_memory(plan.size())?;
+        if plan.shows_nothing() {
+            return Ok(MeshFrame::of_nothing(plan.size()));
+        }
         let started = Instant::now();
         let pipeline = self.pipelines.of(PipelineKey::mesh(plan))?;
         let bindings = pipeline.bindings().to_vec();

@@ -15,6 +15,9 @@ impl MeshBackend for WgpuBackend {
     fn render_mesh(&mut self, plan: &MeshPlan) -> Result<MeshFrame, RenderError> {
         self.check_size(plan.size())?;
         check_memory(plan.size())?;
+        if plan.shows_nothing() {
+            return Ok(MeshFrame::of_nothing(plan.size()));
+        }
         let started = Instant::now();
         let key = PipelineKey::mesh(plan);
         self.pipelines.of(key)?;

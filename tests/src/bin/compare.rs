@@ -10,6 +10,7 @@ use brickfield_conformance::ljung::{LjungArgs, ljung};
 use brickfield_conformance::report::{Report, absences, table};
 use brickfield_conformance::saladi::{SaladiArgs, saladi};
 use brickfield_conformance::tong::{TongArgs, tong};
+use brickfield_conformance::wynn::{WynnArgs, wynn};
 use clap::Parser;
 
 fn main() -> ExitCode {
@@ -54,6 +55,10 @@ fn of_paper(paper: &str) -> ExitCode {
         "tong" => {
             let args = TongArgs::parse();
             (tong(&args), args.common.check)
+        }
+        "wynn" => {
+            let args = WynnArgs::parse();
+            (wynn(&args), args.common.check)
         }
         _ => {
             let args = LamarArgs::parse();

@@ -34,11 +34,13 @@ pub enum MeshMutant {
     EdgesRotated,
     /// Vertices are rounded to 1/1024 of the mesh.
     CoarsePositions,
+    /// The whole grid is drawn as one zone, though nothing was selected.
+    Ghost,
 }
 
 impl MeshMutant {
     /// All of them.
-    pub const ALL: [MeshMutant; 11] = [
+    pub const ALL: [MeshMutant; 12] = [
         MeshMutant::NotConstrained,
         MeshMutant::NotStitched,
         MeshMutant::TriangleMissing,
@@ -50,6 +52,7 @@ impl MeshMutant {
         MeshMutant::WideLines,
         MeshMutant::EdgesRotated,
         MeshMutant::CoarsePositions,
+        MeshMutant::Ghost,
     ];
 
     /// The mutant's name in reports.
@@ -66,6 +69,7 @@ impl MeshMutant {
             MeshMutant::WideLines => "mesh/wide-lines",
             MeshMutant::EdgesRotated => "mesh/edges-rotated",
             MeshMutant::CoarsePositions => "mesh/coarse-positions",
+            MeshMutant::Ghost => "mesh/ghost",
         }
     }
 
@@ -119,7 +123,22 @@ impl MeshMutant {
                 let positions = surrogate.positions.iter().map(|p| (*p / grain).round() * grain).collect();
                 test.plan(&SurrogateMesh { positions, ..surrogate.clone() }, view)
             }
+            MeshMutant::Ghost => test.plan(&whole(honest), view),
         }
+    }
+}
+
+/// Two triangles over the whole grid.
+fn whole(honest: &PreparedMesh) -> SurrogateMesh {
+    let grid = &honest.test.grid;
+    let (row, column) = (grid.n_rows(), grid.n_columns());
+    let nodes = [[0, 0], [0, column], [row, column], [row, 0]].map(|[row, column]| Node { row, column });
+    SurrogateMesh {
+        positions: nodes.map(|node| grid.position(node)).into(),
+        values: nodes.map(|node| grid.value(node)).into(),
+        nodes: nodes.into(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        n_moved: 0,
     }
 }
 

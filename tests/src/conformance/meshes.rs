@@ -34,6 +34,8 @@ pub enum Covers {
     Part,
     /// All: a pixel without the surface is a crack.
     Everything,
+    /// None.
+    Nothing,
 }
 
 /// A mesh case's plan, its reference, and how far a picture may be from it.
@@ -69,7 +71,10 @@ impl PreparedMesh {
             Covers::Part if n_bare == 0 || n_bare == n_pixels => {
                 return Err(Complaint::Blank { found: "all or nothing", stated: "a part" });
             }
-            Covers::Part | Covers::Everything => {}
+            Covers::Nothing if n_bare < n_pixels => {
+                return Err(Complaint::Blank { found: "something", stated: "nothing" });
+            }
+            Covers::Part | Covers::Everything | Covers::Nothing => {}
         }
         let tolerance = Tolerance::of_ambiguity(&answer.ambiguity);
         Ok(PreparedMesh { test, surrogate, plan, answer, tolerance })

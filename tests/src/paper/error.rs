@@ -21,6 +21,10 @@ pub enum PaperError {
     NoSuchData { only: String, known: String },
     #[error(transparent)]
     Volume(#[from] brickfield::io::OpenError),
+    #[error("{} is no terrain: heights over an even grid", path.display())]
+    NotTerrain { path: PathBuf },
+    #[error(transparent)]
+    Surface(#[from] brickfield::SurfaceError),
     #[error("--out {}: {source}", path.display())]
     Out { path: PathBuf, source: io::Error },
     #[error(transparent)]

@@ -66,6 +66,8 @@ pub enum Paper {
     Saladi,
     /// Tong, Wang, Tsang and Tang 1999: efficiently rendering large volume data using texture mapping hardware.
     Tong,
+    /// Wynn, Barnes, Hamann and Miller 1999: multiresolution and adaptive rendering techniques for structured, curvilinear data.
+    Wynn,
 }
 
 /// The subject of a claim.

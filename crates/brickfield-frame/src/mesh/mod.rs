@@ -217,6 +217,11 @@ pub struct MeshFrame {
 }
 
 impl MeshFrame {
+    /// The picture of nothing.
+    pub fn of_nothing(size: UVec2) -> MeshFrame {
+        MeshFrame { pixels: Image::transparent(size), timing: Timing::default(), uploaded_bytes: 0 }
+    }
+
     /// Linear, premultiplied RGBA: opaque where the mesh is.
     pub fn image(&self) -> Image<f32> {
         let mut image = self.pixels.clone();

@@ -38,6 +38,7 @@ struct MeshSetup {
 enum Chosen {
     Random(u64),
     Budget(usize),
+    Nothing,
 }
 
 const PERSPECTIVE: Projection = Projection::Perspective { fov_y: 0.7 };
@@ -82,6 +83,7 @@ impl MeshSetup {
     fn select(&self, tree: QuadTree, camera: Camera) -> Selection {
         match self.chosen {
             Chosen::Random(seed) => random_selection(&tree, seed),
+            Chosen::Nothing => Selection::of_leaves(&tree, []).expect("nothing overlaps"),
             Chosen::Budget(n) => {
                 let mut selector = BudgetSelector::new(std::sync::Arc::new(tree));
                 selector.update(&View::new(camera, self.size).expect("a view"), n);
@@ -138,6 +140,9 @@ fn drawn() -> Vec<Case> {
         ),
         MeshSetup { coloring: Coloring::Gouraud, ..of(GridKind::Heights) }
             .case("gouraud", catches![OtherColoring, ValuesOffset]),
+        // Whatever is drawn is too much.
+        MeshSetup { chosen: Chosen::Nothing, covers: Covers::Nothing, ..of(GridKind::Heights) }
+            .case("nothing", catches![Ghost]),
         MeshSetup { chosen: Chosen::Budget(120), ..of(GridKind::Heights) }
             .case("budget", catches![NotConstrained, TriangleMissing]),
         of(GridKind::Torus).case("torus", catches![TriangleMissing, PixelCorner]),
