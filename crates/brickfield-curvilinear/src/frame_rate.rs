@@ -114,6 +114,8 @@ impl PredictiveBudget {
     const SPREAD: f64 = 0.05;
     /// How far a frame may be from the model before the model is scaled.
     const SURPRISE: f64 = 1.4;
+    /// The share of a frame's time that polygons take from which on the frame tells how fast they are: one that shows next to nothing does not.
+    const OF_POLYGONS: f64 = 0.5;
     /// The least factor by which one frame scales the model: a single fast frame is not believed at once.
     const FASTEST: f64 = 0.5;
 
@@ -141,7 +143,9 @@ impl PredictiveBudget {
     pub fn observe(&mut self, frame: FrameTime) -> Result<u32, FrameTimeError> {
         check("frame time", frame.seconds)?;
         let n = f64::from(frame.n_polygons.max(1));
-        if let Some(predicted) = self.predicted(frame.n_polygons).filter(|seconds| *seconds > 0.0) {
+        if let (Some(predicted), Some(slope)) = (self.predicted(frame.n_polygons), self.per_polygon)
+            && slope * n >= PredictiveBudget::OF_POLYGONS * predicted
+        {
             self.follow(frame.seconds / predicted);
         }
         self.frames.add(n, frame.seconds, PredictiveBudget::KEEP);

@@ -31,7 +31,10 @@ struct FlightRow {
     median_ms: f64,
     longest_ms: f64,
     mean_zones: f64,
+    /// Frame by frame: the time in milliseconds, the budget, and the zones that were drawn.
     ms: Vec<f64>,
+    budgets: Vec<usize>,
+    zones: Vec<usize>,
 }
 
 /// A controller of the number of zones.
@@ -113,7 +116,7 @@ fn fly(
 ) -> Result<FlightRow, PaperError> {
     let n = args.flight_frames;
     let mut selector = BudgetSelector::new(Arc::clone(&terrain.tree));
-    let (mut ms, mut n_zones) = (Vec::new(), 0usize);
+    let (mut ms, mut budgets, mut zones) = (Vec::new(), Vec::new(), Vec::new());
     for i in 0..n {
         let view = seen(args, terrain, i)?;
         let begin = Instant::now();
@@ -128,7 +131,8 @@ fn fly(
         let seconds = begin.elapsed().as_secs_f64();
         let n_polygons = selector.selection().n_leaves() as u32;
         controller.observe(FrameTime { n_polygons, seconds });
-        n_zones += selector.selection().n_leaves();
+        budgets.push(budget);
+        zones.push(selector.selection().n_leaves());
         ms.push(seconds * 1e3);
     }
     let share = |most: f64| ms.iter().filter(|ms| **ms <= most).count() as f64 / f64::from(n);
@@ -140,8 +144,10 @@ fn fly(
         nearly_within: share(1.1 * args.flight_ms),
         median_ms: quantile(ms.clone(), 0.5),
         longest_ms: quantile(ms.clone(), 1.0),
-        mean_zones: n_zones as f64 / f64::from(n),
+        mean_zones: zones.iter().sum::<usize>() as f64 / f64::from(n),
         ms,
+        budgets,
+        zones,
     })
 }
 

@@ -107,3 +107,22 @@ fn bad_times_are_named_and_change_nothing() {
         "budgets from 5 to 2 polygons; the least must be at least 1, and at most the greatest"
     );
 }
+
+/// Frames that show nothing take next to no time, and do not tell that polygons have become faster.
+#[test]
+fn a_view_of_the_sky_does_not_raise_the_budget() {
+    let target = FrameTarget::new(0.050, 16, 1 << 22).unwrap();
+    let mut budget = PredictiveBudget::new(target, 2_000);
+    let seconds = |n: u32| if n == 0 { 0.0002 } else { 0.004 + 4e-6 * f64::from(n) };
+    for _ in 0..40 {
+        let n_polygons = budget.budget();
+        budget.observe(FrameTime { n_polygons, seconds: seconds(n_polygons) }).unwrap();
+    }
+    let before = budget.budget();
+    assert!((11_000..12_500).contains(&before), "{before}");
+    for _ in 0..30 {
+        budget.observe(FrameTime { n_polygons: 0, seconds: seconds(0) }).unwrap();
+    }
+    let after = budget.budget();
+    assert!(seconds(after) < 1.2 * 0.050, "{before} became {after}");
+}
