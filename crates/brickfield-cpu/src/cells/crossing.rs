@@ -6,42 +6,21 @@
 
 use std::sync::LazyLock;
 
+use brickfield_core::glam::Vec3;
 use brickfield_frame::CellFace;
 
+use super::lanes::{Areas, EDGES, Lanes, N_EDGES};
 use super::line::Corners;
-
-/// The edges of a cell, then the diagonals of its faces: lower corner, upper corner.
-const EDGES: [[usize; 2]; N_EDGES] = [
-    [0, 1],
-    [2, 3],
-    [4, 5],
-    [6, 7],
-    [0, 2],
-    [1, 3],
-    [4, 6],
-    [5, 7],
-    [0, 4],
-    [1, 5],
-    [2, 6],
-    [3, 7],
-    [0, 6],
-    [1, 7],
-    [0, 5],
-    [2, 7],
-    [0, 3],
-    [4, 7],
-];
-const N_EDGES: usize = 18;
 
 /// A triangle: twice the face, and 0 or 1 for its half.
 pub(super) type Triangle = usize;
 
-/// The edge opposite to each corner of a triangle, and whether the triangle runs along it from its lower corner.
+/// A triangle's corners, and the edge opposite to each.
 #[derive(Clone, Copy)]
 struct Shape {
     corners: [usize; 3],
     edges: [usize; 3],
-    /// The signs of its edges where a line leaves a cell of a right-handed grid through it; where one enters, all are the others.
+    /// The bits of its edges; and those of them that are set where a line leaves a cell of a right-handed grid. Where one enters, the others are.
     mask: u32,
     leaving: u32,
 }
@@ -76,6 +55,17 @@ const fn shape(corners: [usize; 3]) -> Shape {
     shape
 }
 
+/// The local coordinates of corners.
+const LOCAL: [Vec3; 8] = {
+    let mut local = [Vec3::ZERO; 8];
+    let mut i = 0;
+    while i < 8 {
+        local[i] = Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
+        i += 1;
+    }
+    local
+};
+
 /// For all signs: the triangle that is entered, and 16 times the one that is left; or [`MANY`].
 static PAIRS: LazyLock<Vec<u8>> = LazyLock::new(|| (0..1 << N_EDGES).map(pair).collect());
 
@@ -98,6 +88,7 @@ fn pair(signs: u32) -> u8 {
 }
 
 /// Whether a triangle is crossed, and whether a cell of a right-handed grid is left there.
+#[inline(always)]
 fn crossed(shape: &Shape, signs: u32) -> Option<bool> {
     let own = signs & shape.mask;
     if own == shape.leaving { Some(true) } else { (own == shape.mask ^ shape.leaving).then_some(false) }
@@ -109,10 +100,11 @@ pub(super) struct Crossings {
     pairs: &'static [u8],
 }
 
-/// Twice the areas of the triangles between the line and edges, and their signs.
-#[derive(Clone, Copy)]
-pub(super) struct Sides {
-    areas: [f32; N_EDGES],
+/// On which sides a line passes a cell's edges.
+pub(super) struct Sides<'a, L: Lanes> {
+    corners: &'a Corners<L>,
+    /// Twice the areas of the triangles between the line and edges.
+    areas: [f32; 24],
     signs: u32,
 }
 
@@ -122,7 +114,7 @@ pub(super) struct Crossing {
     pub(super) triangle: Triangle,
     pub(super) w: f32,
     /// The place in the cell, by linear interpolation between the triangle's corners.
-    pub(super) local: [f32; 3],
+    pub(super) local: Vec3,
 }
 
 impl Crossings {
@@ -132,71 +124,62 @@ impl Crossings {
 
     /// The triangles that a line enters and leaves a cell of a right-handed grid by, if it does so once.
     #[inline(always)]
-    pub(super) fn once(&self, sides: &Sides) -> Option<[Triangle; 2]> {
+    pub(super) fn once<L: Lanes>(&self, sides: &Sides<L>) -> Option<[Triangle; 2]> {
         let pair = self.pairs[sides.signs as usize];
         (pair != MANY).then_some([usize::from(pair & 15), usize::from(pair >> 4)])
     }
 }
 
-impl Sides {
+impl<'a, L: Lanes> Sides<'a, L> {
     #[inline(always)]
-    pub(super) fn of(corners: &Corners) -> Sides {
-        let Corners { u, v, .. } = corners;
-        let (mut areas, mut signs, mut unsure) = ([0f32; N_EDGES], 0u32, 0u32);
-        for (i, [a, b]) in EDGES.into_iter().enumerate() {
-            let less = u[b] * v[a];
-            let area = u[a] * v[b] - less;
-            areas[i] = area;
-            signs |= u32::from(area > 0.0) << i;
-            // Of three roundings each is at most 2^-24 of a product, or of their difference.
-            unsure |= u32::from(area.abs() <= less.abs() * UNSURE) << i;
-        }
-        if unsure != 0 {
-            signs = exact_signs(corners);
-        }
-        Sides { areas, signs }
+    pub(super) fn of(corners: &'a Corners<L>) -> Sides<'a, L> {
+        let Areas { areas, signs, is_unsure } = corners.lanes.areas(corners.u, corners.v);
+        let signs = if is_unsure { corners.exact_signs() } else { signs };
+        Sides { corners, areas, signs }
     }
 
     /// Where the line crosses a triangle that it is known to cross.
     #[inline(always)]
-    pub(super) fn crossing(&self, corners: &Corners, triangle: Triangle) -> Crossing {
-        let shape = &SHAPES[triangle];
-        let weights = shape.edges.map(|edge| self.areas[edge].abs());
-        let sum = weights[0] + weights[1] + weights[2];
-        let weights = if sum > 0.0 { weights.map(|w| w / sum) } else { [1.0 / 3.0; 3] };
-        let mix = |of: &dyn Fn(usize) -> f32| (0..3).map(|i| weights[i] * of(shape.corners[i])).sum::<f32>();
-        let local = std::array::from_fn(|axis| mix(&|corner| (corner >> axis & 1) as f32));
-        Crossing { triangle, w: mix(&|corner| corners.w[corner]), local }
+    pub(super) fn crossing(&self, triangle: Triangle) -> Crossing {
+        let Shape { corners: [a, b, c], edges, .. } = SHAPES[triangle];
+        let [x, y, z] = edges.map(|edge| self.areas[edge].abs());
+        let sum = (x + y) + z;
+        let (x, y, z) = if sum > 0.0 { (x / sum, y / sum, z / sum) } else { (0.25, 0.25, 0.5) };
+        let w = self.corners.lanes.array(self.corners.w);
+        let local = LOCAL[a] * x + LOCAL[b] * y + LOCAL[c] * z;
+        Crossing { triangle, w: (w[a & 7] * x + w[b & 7] * y) + w[c & 7] * z, local }
     }
 
     /// Whether a triangle is crossed, and whether a cell of a right-handed grid is left there.
+    #[inline(always)]
     pub(super) fn crosses(&self, triangle: Triangle) -> Option<bool> {
         crossed(&SHAPES[triangle], self.signs)
     }
 
     /// All triangles that are left, or entered, along the line.
-    #[cold]
-    pub(super) fn all(&self, corners: &Corners, leaves: bool) -> Vec<Crossing> {
+    pub(super) fn all(&self, leaves: bool) -> Vec<Crossing> {
         let crossed = (0..12).filter(|triangle| self.crosses(*triangle) == Some(leaves));
-        let mut crossings: Vec<Crossing> = crossed.map(|triangle| self.crossing(corners, triangle)).collect();
+        let mut crossings: Vec<Crossing> = crossed.map(|triangle| self.crossing(triangle)).collect();
         crossings.sort_by(|a, b| a.w.total_cmp(&b.w).then(a.triangle.cmp(&b.triangle)));
         crossings
     }
 }
 
-const UNSURE: f32 = 1.0 / (1 << 22) as f32;
-
-/// The signs in f64, in which products of f32 are exact.
-#[cold]
-#[inline(never)]
-fn exact_signs(corners: &Corners) -> u32 {
-    let at = |i: usize| [f64::from(corners.u[i]), f64::from(corners.v[i])];
-    let is_positive = |[a, b]: [usize; 2]| {
-        let ([ua, va], [ub, vb]) = (at(a), at(b));
-        let area = ua * vb - ub * va;
-        // Shifted along u; where the edge is parallel to u, along v.
-        let shifted = if area != 0.0 { area } else { va - vb };
-        if shifted != 0.0 { shifted > 0.0 } else { ub > ua }
-    };
-    EDGES.into_iter().enumerate().fold(0, |signs, (i, edge)| signs | u32::from(is_positive(edge)) << i)
+impl<L: Lanes> Corners<L> {
+    /// The signs in f64, in which products of f32 are exact.
+    #[cold]
+    #[inline(never)]
+    fn exact_signs(&self) -> u32 {
+        let (u, v) = (self.lanes.array(self.u), self.lanes.array(self.v));
+        let at = |i: usize| [f64::from(u[i]), f64::from(v[i])];
+        let is_positive = |[a, b]: [usize; 2]| {
+            let ([ua, va], [ub, vb]) = (at(a), at(b));
+            let area = ua * vb - ub * va;
+            // Shifted along u; where the edge is parallel to u, along v.
+            let shifted = if area != 0.0 { area } else { va - vb };
+            if shifted != 0.0 { shifted > 0.0 } else { ub > ua }
+        };
+        let edges = EDGES.into_iter().enumerate().take(N_EDGES);
+        edges.fold(0, |signs, (i, edge)| signs | u32::from(is_positive(edge)) << i)
+    }
 }

@@ -1,10 +1,11 @@
 //! Where lines enter cells from outside.
 
 use brickfield_core::glam::Vec3;
-use brickfield_frame::{CellFace, Handedness};
+use brickfield_frame::{CellFace, FaceBox, Handedness};
 
 use super::crossing::{Crossing, Sides};
-use super::line::Line;
+use super::lanes::{FACE_CORNERS, Lanes};
+use super::line::{Corners, Line};
 use super::scene::{Cell, Scene};
 
 /// A cell that a line enters from outside, and where.
@@ -17,18 +18,20 @@ pub(super) struct Entry {
 /// Room for the rounding of slabs, in the scene's unit.
 const MARGIN: f32 = 1.0 / (1 << 20) as f32;
 
+/// Most boxes that wait at a time: the tree of 2^31 faces has 30 levels.
+const MAX_OPEN: usize = 64;
+
 /// All entries of a whole line, the last one first.
-pub(super) fn entries(scene: &Scene, line: &Line, entries: &mut Vec<Entry>) {
+#[inline(always)]
+pub(super) fn entries(lanes: impl Lanes, scene: &Scene, line: &Line, entries: &mut Vec<Entry>) {
     entries.clear();
-    let mut open = [0u32; 64];
-    let mut n_open = 1;
+    let (mut open, mut n_open) = ([0u32; MAX_OPEN], 1);
     let cells = scene.plan.cells();
-    let per_unit = (1.0 / scene.unit) as f32;
+    let (boxes, faces) = (cells.boxes(), cells.faces());
     while n_open > 0 {
         n_open -= 1;
-        let around = &cells.boxes()[open[n_open] as usize];
-        let corner = |p: [f32; 3]| Vec3::from_array(p) * per_unit - line.anchor();
-        if !meets(line, corner(around.min) - MARGIN, corner(around.max) + MARGIN) {
+        let around = &boxes[open[n_open] as usize];
+        if !meets(scene, line, around) {
             continue;
         }
         if around.n_faces == 0 {
@@ -37,32 +40,45 @@ pub(super) fn entries(scene: &Scene, line: &Line, entries: &mut Vec<Entry>) {
             n_open += 2;
         }
         let first = around.first as usize;
-        for face in &cells.faces()[first..first + around.n_faces as usize] {
-            enter(scene, line, *face, entries);
+        for face in &faces[first..first + around.n_faces as usize] {
+            enter(lanes, scene, line, *face, entries);
         }
     }
-    entries.sort_unstable_by(|a, b| b.crossing.w.total_cmp(&a.crossing.w));
-}
-
-/// Whether the whole line meets a box, relative to the anchor.
-#[inline(always)]
-fn meets(line: &Line, min: Vec3, max: Vec3) -> bool {
-    let (a, b) = (min * line.inverse, max * line.inverse);
-    // Along an axis that the line does not move along, a or b may be NaN, which `min` and `max` pass over.
-    let start = a.x.min(b.x).max(a.y.min(b.y)).max(a.z.min(b.z));
-    let end = a.x.max(b.x).min(a.y.max(b.y)).min(a.z.max(b.z));
-    start <= end
+    if entries.len() > 1 {
+        entries.sort_unstable_by(|a, b| b.crossing.w.total_cmp(&a.crossing.w));
+    }
 }
 
 #[inline(always)]
-fn enter(scene: &Scene, line: &Line, face: CellFace, entries: &mut Vec<Entry>) {
-    let cell = scene.cell(face.cell());
-    let corners = line.corners(scene, cell.node);
+fn meets(scene: &Scene, line: &Line, around: &FaceBox) -> bool {
+    let corner = |p: [f32; 3]| Vec3::from_array(p) * scene.per_unit;
+    line.meets(corner(around.min) - MARGIN, corner(around.max) + MARGIN)
+}
+
+#[inline(always)]
+fn enter(lanes: impl Lanes, scene: &Scene, line: &Line, face: CellFace, entries: &mut Vec<Entry>) {
+    let (cell, face) = (scene.cell(face.cell()), face.face() as usize);
+    let corners = Corners::of(lanes, scene, line, cell.node);
+    if !corners.surround(ON_FACE[face]) {
+        return;
+    }
     let sides = Sides::of(&corners);
     let enters = scene.handedness == Handedness::Left;
-    for triangle in [2 * face.face() as usize, 2 * face.face() as usize + 1] {
+    for triangle in [2 * face, 2 * face + 1] {
         if sides.crosses(triangle) == Some(enters) {
-            entries.push(Entry { cell, crossing: sides.crossing(&corners, triangle) });
+            entries.push(Entry { cell, crossing: sides.crossing(triangle) });
         }
     }
 }
+
+/// A bit for each corner of a face.
+const ON_FACE: [u32; 6] = {
+    let mut bits = [0; 6];
+    let mut i = 0;
+    while i < 24 {
+        let (face, lower) = (i / 4, FACE_CORNERS[i / 8][i % 4]);
+        bits[face] |= 1 << (lower | ((face % 2) << (face / 2)));
+        i += 1;
+    }
+    bits
+};

@@ -3,24 +3,25 @@
 use brickfield_core::glam::{DVec3, Vec3, Vec4};
 use brickfield_frame::ViewRay;
 
+use super::lanes::{FACE_CORNERS, Lanes, Rows};
 use super::scene::Scene;
 
 /// A line, in the scene's unit: u and v across it, w along it from the ray's anchor.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
-    /// The rows that make u, v and w of a position; what is added to each.
-    rows: [[f32; 4]; 3],
+    rows: Rows,
     anchor: Vec3,
     direction: Vec3,
-    pub(super) inverse: Vec3,
+    inverse: Vec3,
 }
 
 /// Corners of a cell as seen along a line.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Corners {
-    pub(super) u: [f32; 8],
-    pub(super) v: [f32; 8],
-    pub(super) w: [f32; 8],
+#[derive(Clone, Copy)]
+pub(super) struct Corners<L: Lanes> {
+    pub(super) lanes: L,
+    pub(super) u: L::Eight,
+    pub(super) v: L::Eight,
+    pub(super) w: L::Eight,
 }
 
 impl Line {
@@ -33,13 +34,8 @@ impl Line {
             let [x, y, z] = axis.as_vec3().to_array();
             [x, y, z, -axis.dot(anchor) as f32]
         };
-        let direction = ray.direction.as_vec3();
-        Line {
-            rows: [row(u), row(v), row(ray.direction)],
-            anchor: anchor.as_vec3(),
-            direction,
-            inverse: direction.recip(),
-        }
+        let (rows, direction) = ([row(u), row(v), row(ray.direction)], ray.direction.as_vec3());
+        Line { rows, anchor: anchor.as_vec3(), direction, inverse: direction.recip() }
     }
 
     /// The position at w.
@@ -48,45 +44,45 @@ impl Line {
         (self.anchor + self.direction * w).extend(0.0)
     }
 
-    pub(super) fn anchor(&self) -> Vec3 {
-        self.anchor
-    }
-
-    /// The same numbers for the same node, whichever cell asks.
+    /// Whether the whole line meets a box.
     #[inline(always)]
-    fn see(&self, node: Vec4) -> [f32; 3] {
-        let of = |[x, y, z, add]: [f32; 4]| ((node.x * x + node.y * y) + node.z * z) + add;
-        self.rows.map(of)
-    }
-
-    /// All corners of a cell.
-    #[inline(always)]
-    pub(super) fn corners(&self, scene: &Scene, node: usize) -> Corners {
-        let mut corners = Corners::default();
-        for i in 0..8 {
-            self.see_corner(scene, node, i, &mut corners);
-        }
-        corners
-    }
-
-    /// The corners of the next cell, of which those at `face` are corners of the last one.
-    #[inline(always)]
-    pub(super) fn follow(&self, scene: &Scene, node: usize, face: usize, corners: &mut Corners) {
-        let (bit, side) = (1 << (face >> 1), face & 1);
-        for i in FACE_CORNERS[face >> 1] {
-            let (near, far) = if side == 0 { (i, i | bit) } else { (i | bit, i) };
-            corners.u[near] = corners.u[far];
-            corners.v[near] = corners.v[far];
-            corners.w[near] = corners.w[far];
-            self.see_corner(scene, node, far, corners);
-        }
-    }
-
-    #[inline(always)]
-    fn see_corner(&self, scene: &Scene, node: usize, i: usize, corners: &mut Corners) {
-        [corners.u[i], corners.v[i], corners.w[i]] = self.see(scene.nodes[node + scene.corners[i]]);
+    pub(super) fn meets(&self, min: Vec3, max: Vec3) -> bool {
+        let (a, b) = ((min - self.anchor) * self.inverse, (max - self.anchor) * self.inverse);
+        // Along an axis that the line does not move along, a or b may be NaN, which `min` and `max` pass over.
+        let start = a.x.min(b.x).max(a.y.min(b.y)).max(a.z.min(b.z));
+        let end = a.x.max(b.x).min(a.y.max(b.y)).min(a.z.max(b.z));
+        start <= end
     }
 }
 
-/// The corners of the lower face along each axis.
-const FACE_CORNERS: [[usize; 4]; 3] = [[0, 2, 4, 6], [0, 1, 4, 5], [0, 1, 2, 3]];
+impl<L: Lanes> Corners<L> {
+    /// The corners of a cell.
+    #[inline(always)]
+    pub(super) fn of(lanes: L, scene: &Scene, line: &Line, node: usize) -> Corners<L> {
+        let see = |corners: [usize; 4]| lanes.see(&line.rows, corners.map(|i| scene.nodes[node + scene.corners[i]]));
+        let (low, high) = (see([0, 1, 2, 3]), see([4, 5, 6, 7]));
+        let [u, v, w] = std::array::from_fn(|i| lanes.join(low[i], high[i]));
+        Corners { lanes, u, v, w }
+    }
+
+    /// The corners of the next cell, of which those at `face` are corners of this one.
+    #[inline(always)]
+    pub(super) fn follow(&mut self, scene: &Scene, line: &Line, node: usize, face: usize) {
+        let beyond = node + if face & 1 == 0 { scene.node_strides[face >> 1] } else { 0 };
+        let new = FACE_CORNERS[face >> 1].map(|i| scene.nodes[beyond + scene.corners[i]]);
+        let [u, v, w] = self.lanes.see(&line.rows, new);
+        self.u = self.lanes.follow(self.u, u, face);
+        self.v = self.lanes.follow(self.v, v, face);
+        self.w = self.lanes.follow(self.w, w, face);
+    }
+
+    /// Whether some of the corners surround the line in the two directions across it; if not, no triangle between them is crossed.
+    #[inline(always)]
+    pub(super) fn surround(&self, corners: u32) -> bool {
+        let is_mixed = |numbers| {
+            let signs = self.lanes.signs(numbers) & corners;
+            signs != 0 && signs != corners
+        };
+        is_mixed(self.u) && is_mixed(self.v)
+    }
+}

@@ -1,11 +1,12 @@
 //! The segments of a ray, and their light.
 
-use brickfield_core::glam::{UVec2, Vec3};
+use brickfield_core::glam::UVec2;
 use brickfield_frame::ViewRay;
 use brickfield_optics::QuadratureRule;
 
 use super::crossing::Crossings;
 use super::entry::{Entry, entries};
+use super::lanes::Lanes;
 use super::line::Line;
 use super::map::Map;
 use super::scene::Scene;
@@ -13,7 +14,8 @@ use super::walk::{Passage, Walk};
 use crate::fast::segment::{Ray32, segment};
 
 /// Marches rays, one after the other.
-pub(super) struct March<'a> {
+pub(super) struct March<'a, L> {
+    lanes: L,
     scene: &'a Scene<'a>,
     crossings: Crossings,
     rule: QuadratureRule,
@@ -38,10 +40,11 @@ struct Run<'a> {
     head: usize,
 }
 
-impl<'a> March<'a> {
-    pub(super) fn new(scene: &'a Scene<'a>) -> March<'a> {
+impl<'a, L: Lanes> March<'a, L> {
+    pub(super) fn new(lanes: L, scene: &'a Scene<'a>) -> March<'a, L> {
         let sampling = scene.plan.sampling();
         March {
+            lanes,
             scene,
             crossings: Crossings::new(),
             rule: sampling.rule(),
@@ -66,7 +69,7 @@ impl<'a> March<'a> {
         let (scene, unit) = (self.scene, self.scene.unit);
         let (line, anchor) = (Line::of(ray, unit), ray.t_anchor / unit);
         let mut entered = std::mem::take(&mut self.entries);
-        entries(scene, &line, &mut entered);
+        entries(self.lanes, scene, &line, &mut entered);
         // Where the eye is, and then where the last cell was left.
         let mut from = -anchor;
         let end = t_end / unit - anchor;
@@ -84,7 +87,7 @@ impl<'a> March<'a> {
     fn run(&mut self, line: &Line, anchor: f64, entry: &Entry, [start, end]: [f64; 2], state: &mut Ray32) -> f64 {
         let from = start.max(f64::from(entry.crossing.w));
         let mut run = Run { line, anchor, k: ((from + anchor) / self.step).floor(), from, head: 0 };
-        let mut walk = Walk::new(self.scene, self.crossings, line, entry);
+        let mut walk = Walk::new(self.lanes, self.scene, self.crossings, line, entry);
         let mut reached = from as f32;
         self.passages.clear();
         while let Some(mut passage) = walk.step() {
@@ -160,7 +163,7 @@ impl<'a> March<'a> {
         }
         let [w_in, w_out] = passage.w;
         let part = if w_out > w_in { ((w - w_in) / (w_out - w_in)).clamp(0.0, 1.0) } else { 0.5 };
-        let [local_in, local_out] = passage.local.map(Vec3::from_array);
+        let [local_in, local_out] = passage.local;
         let guess = local_in + (local_out - local_in) * part;
         Some(Map::of(self.scene, passage.node).value(run.line.at(w), guess))
     }

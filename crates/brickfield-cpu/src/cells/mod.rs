@@ -3,6 +3,7 @@
 mod crossing;
 mod discrete;
 mod entry;
+mod lanes;
 mod line;
 mod map;
 mod march;
@@ -21,6 +22,7 @@ pub use discrete::{DiscreteCells, discrete_cells};
 use crate::CpuBackend;
 use crate::fast::segment::Ray32;
 use crate::fast::{check, milliseconds};
+use lanes::{Lanes, Plain};
 use march::March;
 use scene::Scene;
 
@@ -35,7 +37,7 @@ impl CellsBackend for CpuBackend {
         let simd = pulp::Arch::new();
         let bands = image.pixels_mut().par_chunks_mut(width * TILE).enumerate();
         bands.for_each(|(band, pixels)| {
-            simd.dispatch(Band { scene: &scene, first_row: band * TILE, width, pixels });
+            render(simd, &scene, UVec2::new(width as u32, (band * TILE) as u32), pixels);
         });
         Ok(Frame::new(image, Cost::of_rendering(milliseconds(begin))))
     }
@@ -44,20 +46,31 @@ impl CellsBackend for CpuBackend {
 /// Pixels along a tile's side: neighbouring rays pass the same cells while these are in the cache.
 const TILE: usize = 8;
 
+/// Renders rows by the processor's instructions: the width of the picture, and the first row.
+fn render(simd: pulp::Arch, scene: &Scene, place: UVec2, pixels: &mut [[f32; 4]]) {
+    let [width, first_row] = place.to_array().map(|x| x as usize);
+    #[cfg(target_arch = "x86_64")]
+    if let pulp::Arch::V3(lanes) = simd {
+        return pulp::Simd::vectorize(lanes, Band { lanes, scene, first_row, width, pixels });
+    }
+    simd.dispatch(Band { lanes: Plain, scene, first_row, width, pixels });
+}
+
 /// [`TILE`] rows of the picture: all that is inlined below it is compiled once for each instruction set.
-struct Band<'a> {
+struct Band<'a, L> {
+    lanes: L,
     scene: &'a Scene<'a>,
     first_row: usize,
     width: usize,
     pixels: &'a mut [[f32; 4]],
 }
 
-impl pulp::NullaryFnOnce for Band<'_> {
+impl<L: Lanes> pulp::WithSimd for Band<'_, L> {
     type Output = ();
     #[inline(always)]
-    fn call(self) {
+    fn with_simd<S: pulp::Simd>(self, _: S) {
         let n_rows = self.pixels.len() / self.width;
-        let mut march = March::new(self.scene);
+        let mut march = March::new(self.lanes, self.scene);
         for tile in (0..self.width).step_by(TILE) {
             for y in 0..n_rows {
                 for x in tile..(tile + TILE).min(self.width) {

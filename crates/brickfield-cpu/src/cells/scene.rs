@@ -24,6 +24,7 @@ pub(super) struct Scene<'a> {
     pub(super) transfer: Classifier,
     /// A power of two near the radius, in world units: products of lengths stay within f32.
     pub(super) unit: f64,
+    pub(super) per_unit: f32,
     pub(super) handedness: Handedness,
 }
 
@@ -57,6 +58,7 @@ impl<'a> Scene<'a> {
             dark: Vec::new(),
             transfer: Classifier::new(plan.transfer(), scale),
             unit,
+            per_unit: (1.0 / unit) as f32,
             handedness: cells.handedness(),
         };
         scene.dark = scene.dark_cells();

@@ -1,18 +1,20 @@
 //! From cell to cell along a line.
 
+use brickfield_core::glam::Vec3;
 use brickfield_frame::Handedness;
 
 use super::crossing::{Crossing, Crossings, Sides};
 use super::entry::Entry;
+use super::lanes::Lanes;
 use super::line::{Corners, Line};
 use super::scene::{Cell, Scene};
 
 /// A line on its way through a row of cells.
-pub(super) struct Walk<'a> {
+pub(super) struct Walk<'a, L: Lanes> {
     scene: &'a Scene<'a>,
     crossings: Crossings,
     line: &'a Line,
-    corners: Corners,
+    corners: Corners<L>,
     /// The next cell, and where it is entered.
     cell: Option<Cell>,
     entered: Crossing,
@@ -26,13 +28,19 @@ pub(super) struct Passage {
     /// Where the line enters and leaves; not in order if the cell is folded.
     pub(super) w: [f32; 2],
     /// Near the local coordinates of both.
-    pub(super) local: [[f32; 3]; 2],
+    pub(super) local: [Vec3; 2],
 }
 
-impl<'a> Walk<'a> {
+impl<'a, L: Lanes> Walk<'a, L> {
     #[inline(always)]
-    pub(super) fn new(scene: &'a Scene<'a>, crossings: Crossings, line: &'a Line, entry: &Entry) -> Walk<'a> {
-        let corners = line.corners(scene, entry.cell.node);
+    pub(super) fn new(
+        lanes: L,
+        scene: &'a Scene<'a>,
+        crossings: Crossings,
+        line: &'a Line,
+        entry: &Entry,
+    ) -> Walk<'a, L> {
+        let corners = Corners::of(lanes, scene, line, entry.cell.node);
         Walk { scene, crossings, line, corners, cell: Some(entry.cell), entered: entry.crossing }
     }
 
@@ -51,7 +59,7 @@ impl<'a> Walk<'a> {
         let face = left.triangle >> 1;
         self.cell = self.scene.beside(cell, face);
         if let Some(next) = self.cell {
-            self.line.follow(self.scene, next.node, face ^ 1, &mut self.corners);
+            self.corners.follow(self.scene, self.line, next.node, face ^ 1);
             let mut local = left.local;
             local[face >> 1] = 1.0 - local[face >> 1];
             self.entered = Crossing { triangle: left.triangle ^ 2, w: left.w, local };
@@ -60,12 +68,10 @@ impl<'a> Walk<'a> {
     }
 
     #[inline(always)]
-    fn exit(&self, sides: &Sides) -> Option<Crossing> {
+    fn exit(&self, sides: &Sides<L>) -> Option<Crossing> {
         let is_left = usize::from(self.scene.handedness == Handedness::Right);
         match self.crossings.once(sides) {
-            Some(pair) if pair[1 - is_left] == self.entered.triangle => {
-                Some(sides.crossing(&self.corners, pair[is_left]))
-            }
+            Some(pair) if pair[1 - is_left] == self.entered.triangle => Some(sides.crossing(pair[is_left])),
             _ => self.exit_of_many(sides),
         }
     }
@@ -73,10 +79,10 @@ impl<'a> Walk<'a> {
     /// A cell that is not convex may be entered several times: the first exit belongs to the first entry, the second to the second.
     #[cold]
     #[inline(never)]
-    fn exit_of_many(&self, sides: &Sides) -> Option<Crossing> {
+    fn exit_of_many(&self, sides: &Sides<L>) -> Option<Crossing> {
         let leaves = self.scene.handedness == Handedness::Right;
-        let entered = sides.all(&self.corners, !leaves);
+        let entered = sides.all(!leaves);
         let turn = entered.iter().position(|crossing| crossing.triangle == self.entered.triangle)?;
-        sides.all(&self.corners, leaves).get(turn).copied()
+        sides.all(leaves).get(turn).copied()
     }
 }
