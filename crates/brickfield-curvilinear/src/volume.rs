@@ -94,7 +94,13 @@ impl CurvilinearVolume {
         CellMap::new(&self.corners(cell)).local_inside(position, DVec3::splat(0.5))
     }
 
-    fn node(&self, i: usize) -> UVec3 {
+    /// The number of a node.
+    pub(crate) fn number(&self, node: UVec3) -> usize {
+        let [nx, ny, _] = self.n_cells().to_array().map(|n| n as usize + 1);
+        node.x as usize + nx * (node.y as usize + ny * node.z as usize)
+    }
+
+    pub(crate) fn node(&self, i: usize) -> UVec3 {
         let [nx, ny, _] = self.n_cells().to_array().map(|n| n as usize + 1);
         UVec3::new((i % nx) as u32, (i / nx % ny) as u32, (i / nx / ny) as u32)
     }
