@@ -75,14 +75,4 @@ impl<L: Lanes> Corners<L> {
         self.v = self.lanes.follow(self.v, v, face);
         self.w = self.lanes.follow(self.w, w, face);
     }
-
-    /// Whether some of the corners surround the line in the two directions across it; if not, no triangle between them is crossed.
-    #[inline(always)]
-    pub(super) fn surround(&self, corners: u32) -> bool {
-        let is_mixed = |numbers| {
-            let signs = self.lanes.signs(numbers) & corners;
-            signs != 0 && signs != corners
-        };
-        is_mixed(self.u) && is_mixed(self.v)
-    }
 }

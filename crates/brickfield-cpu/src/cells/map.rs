@@ -12,7 +12,7 @@ pub(super) struct Map {
 /// Steps of Newton's method before it is left to f64.
 const MAX_STEPS: usize = 6;
 /// A step after which the error is far below f32's digits of a value.
-const LAST_STEP: f32 = 1e-3;
+const LAST_STEP: f32 = 1.0 / 256.0;
 
 impl Map {
     #[inline(always)]

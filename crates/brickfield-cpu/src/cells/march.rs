@@ -5,7 +5,7 @@ use brickfield_frame::ViewRay;
 use brickfield_optics::QuadratureRule;
 
 use super::crossing::Crossings;
-use super::entry::{Entry, entries};
+use super::entry::{Entry, TileFaces};
 use super::lanes::Lanes;
 use super::line::Line;
 use super::map::Map;
@@ -21,6 +21,7 @@ pub(super) struct March<'a, L> {
     rule: QuadratureRule,
     step: f64,
     floor: f64,
+    faces: TileFaces,
     entries: Vec<Entry>,
     passages: Vec<Passage>,
 }
@@ -50,9 +51,15 @@ impl<'a, L: Lanes> March<'a, L> {
             rule: sampling.rule(),
             step: sampling.step_world() / scene.unit,
             floor: sampling.transmittance_floor(),
+            faces: TileFaces::default(),
             entries: Vec::new(),
             passages: Vec::with_capacity(2 * BATCH),
         }
+    }
+
+    /// The next pixels are those of a tile.
+    pub(super) fn enter_tile(&mut self, corner: UVec2, side: u32) {
+        self.faces.find(self.scene, corner, side);
     }
 
     #[inline(always)]
@@ -60,16 +67,19 @@ impl<'a, L: Lanes> March<'a, L> {
         let plan = self.scene.plan;
         let (ray, end) = (plan.rays().ray(at.x, at.y), plan.end(at.x, at.y));
         let mut state = Ray32::default();
-        self.ray(&ray, end.map_or(f64::INFINITY, |(_, t)| f64::from(t)), &mut state);
+        if self.faces.is_empty() {
+            return super::over(&state, end.map(|(color, _)| color));
+        }
+        self.ray(at, &ray, end.map_or(f64::INFINITY, |(_, t)| f64::from(t)), &mut state);
         super::over(&state, end.map(|(color, _)| color))
     }
 
     #[inline(always)]
-    fn ray(&mut self, ray: &ViewRay, t_end: f64, state: &mut Ray32) {
+    fn ray(&mut self, at: UVec2, ray: &ViewRay, t_end: f64, state: &mut Ray32) {
         let (scene, unit) = (self.scene, self.scene.unit);
         let (line, anchor) = (Line::of(ray, unit), ray.t_anchor / unit);
         let mut entered = std::mem::take(&mut self.entries);
-        entries(self.lanes, scene, &line, &mut entered);
+        self.faces.entries(self.lanes, scene, &line, at, &mut entered);
         // Where the eye is, and then where the last cell was left.
         let mut from = -anchor;
         let end = t_end / unit - anchor;

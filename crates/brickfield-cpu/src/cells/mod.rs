@@ -72,6 +72,7 @@ impl<L: Lanes> pulp::WithSimd for Band<'_, L> {
         let n_rows = self.pixels.len() / self.width;
         let mut march = March::new(self.lanes, self.scene);
         for tile in (0..self.width).step_by(TILE) {
+            march.enter_tile(UVec2::new(tile as u32, self.first_row as u32), TILE as u32);
             for y in 0..n_rows {
                 for x in tile..(tile + TILE).min(self.width) {
                     let pixel = UVec2::new(x as u32, (self.first_row + y) as u32);

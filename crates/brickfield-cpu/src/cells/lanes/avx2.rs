@@ -107,12 +107,6 @@ impl Lanes for V3 {
     }
 
     #[inline(always)]
-    fn signs(self, numbers: __m256) -> u32 {
-        let above = self.avx._mm256_cmp_ps::<GREATER>(numbers, self.avx._mm256_setzero_ps());
-        self.avx._mm256_movemask_ps(above) as u32
-    }
-
-    #[inline(always)]
     fn array(self, numbers: __m256) -> [f32; 8] {
         cast(numbers)
     }

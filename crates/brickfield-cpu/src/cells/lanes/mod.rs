@@ -77,9 +77,6 @@ pub(super) trait Lanes: Copy + Send + Sync {
 
     fn areas(self, u: Self::Eight, v: Self::Eight) -> Areas;
 
-    /// Bit i: the number of corner i is above 0.
-    fn signs(self, numbers: Self::Eight) -> u32;
-
     fn array(self, numbers: Self::Eight) -> [f32; 8];
 }
 
@@ -103,7 +100,7 @@ mod tests {
         let mut numbers: Vec<f32> = [u, v, w].into_iter().flat_map(|x| lanes.array(x)).collect();
         let areas = lanes.areas(u, v);
         numbers.extend(&areas.areas[..N_EDGES]);
-        numbers.extend([areas.signs as f32, f32::from(areas.is_unsure), lanes.signs(u) as f32]);
+        numbers.extend([areas.signs as f32, f32::from(areas.is_unsure)]);
         numbers.extend((0..6).flat_map(|face| lanes.array(lanes.follow(u, new[0], face))));
         numbers
     }
@@ -111,7 +108,7 @@ mod tests {
     #[test]
     fn corners_at_a_face_are_kept_and_the_others_are_new() {
         let plain = all(Plain);
-        let (u, next) = (&plain[..8], &plain[24 + N_EDGES + 3..]);
+        let (u, next) = (&plain[..8], &plain[24 + N_EDGES + 2..]);
         let new = Plain.see(&ROWS, nodes(8))[0];
         for (face, next) in next.chunks(8).enumerate() {
             for (i, lower) in FACE_CORNERS[face / 2].into_iter().enumerate() {

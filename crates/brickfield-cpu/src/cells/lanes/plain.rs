@@ -48,11 +48,6 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn signs(self, numbers: [f32; 8]) -> u32 {
-        numbers.iter().enumerate().fold(0, |signs, (i, x)| signs | u32::from(*x > 0.0) << i)
-    }
-
-    #[inline(always)]
     fn array(self, numbers: [f32; 8]) -> [f32; 8] {
         numbers
     }
