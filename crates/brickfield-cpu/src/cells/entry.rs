@@ -116,17 +116,17 @@ impl TileFace {
 
 /// A rectangle around points as a camera sees them, or would behind it: whole lines count. `None` if it reaches to infinity.
 fn rectangle(scene: &Scene, rays: &ViewRays, points: &[DVec3; 4]) -> Option<(DVec2, DVec2)> {
+    let depths = points.map(|point| if rays.are_parallel() { 1.0 } else { point.z });
+    let nearest = 1e-3 * scene.unit;
+    let lie = |beyond: fn(f64, f64) -> bool| depths.iter().all(|depth| beyond(*depth, nearest));
+    if !(rays.are_parallel() || lie(|depth, nearest| depth > nearest) || lie(|depth, nearest| depth < -nearest)) {
+        return None;
+    }
     let half = 0.5 * rays.size.as_dvec2();
-    let (mut min, mut max) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     let margin = 2.0 * MARGIN * scene.unit / rays.pixel[0].length();
-    let is_before = points[0].z > 0.0;
-    for point in points {
-        let depth = if rays.are_parallel() { 1.0 } else { point.z };
-        if (point.z > 0.0) != is_before && !rays.are_parallel() || depth.abs() < 1e-3 * scene.unit && !rays.are_parallel() {
-            return None;
-        }
-        let at = point.truncate() / depth + half;
-        let room = 0.01 + margin / depth.abs();
+    let (mut min, mut max) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    for (point, depth) in points.iter().zip(depths) {
+        let (at, room) = (point.truncate() / depth + half, 0.01 + margin / depth.abs());
         (min, max) = (min.min(at - room), max.max(at + room));
     }
     Some((min, max))

@@ -30,7 +30,11 @@ fn grid(kind: u32, seed: u64) -> Nodes {
         2 => ring(UVec3::new(5, 9, 4), 0.0, waves),
         _ => sheared(UVec3::new(5, 4, 6), shear() * 0.25, waves),
     };
-    if seed % 3 == 0 { nodes.with_holes(|i| (seed >> ((i.x + 5 * i.y + 11 * i.z) % 59)) & 15 == 15) } else { nodes }
+    if seed.is_multiple_of(3) {
+        nodes.with_holes(|i| (seed >> ((i.x + 5 * i.y + 11 * i.z) % 59)) & 15 == 15)
+    } else {
+        nodes
+    }
 }
 
 fn points(low: f64, high: f64) -> impl Strategy<Value = DVec3> {

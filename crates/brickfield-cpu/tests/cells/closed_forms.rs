@@ -66,12 +66,12 @@ fn hold_rounded(nodes: &Nodes, view: &brickfield_frame::CellsView, expected: imp
 }
 
 /// Extinction and colour run linearly along every ray.
-pub fn linear() -> TransferFunction {
+pub(crate) fn linear() -> TransferFunction {
     TransferFunction::new(vec![knot(-20.0, 0.0, [1.0, 0.1, 0.3]), knot(20.0, 0.8, [0.0, 1.0, 0.4])]).unwrap()
 }
 
 /// The integral over a chord in which the value is linear in space.
-pub fn linear_over(ray: &Ray, [start, end]: [f64; 2], value: impl Fn(DVec3) -> f64) -> [f64; 4] {
+pub(crate) fn linear_over(ray: &Ray, [start, end]: [f64; 2], value: impl Fn(DVec3) -> f64) -> [f64; 4] {
     let optics = |t: f64| linear().at(value(ray.at(t)));
     closed_form::linear_extinction_and_color(optics(start), optics(end), end - start)
 }

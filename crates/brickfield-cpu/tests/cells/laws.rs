@@ -167,13 +167,13 @@ fn a_surface_behind_or_amid_the_cells_ends_rays() {
     let distance_of_surface = view.camera.eye().distance(nodes.extent().center());
     let color = [0.5f32, 0.25, 0.125];
     for t in [0.5 * distance_of_surface, distance_of_surface + 0.3, 10.0 * distance_of_surface] {
-        let pixel = |i: u32| if i % 3 == 0 { [0.0; 4] } else { [color[0], color[1], color[2], t as f32] };
+        let pixel = |i: u32| if i.is_multiple_of(3) { [0.0; 4] } else { [color[0], color[1], color[2], t as f32] };
         let behind = Image::new(view.size, (0..256).map(pixel).collect()).unwrap();
         let view = CellsView { behind: Some(Arc::new(behind)), ..view.clone() };
         for (image, tolerance) in both(&plan(&nodes, &view)) {
             for (i, (got, ray)) in image.pixels().iter().zip(rays(&view)).enumerate() {
                 let Some([start, end]) = chord(&ray, &planes) else { continue };
-                let expected = if i % 3 == 0 {
+                let expected = if i.is_multiple_of(3) {
                     foggy(0.4, end - start)
                 } else {
                     let front = foggy(0.4, (end.min(t) - start).max(0.0));

@@ -52,6 +52,11 @@ pub enum CellsPlanError {
     Division,
     #[error("nominal lengths; the segments of cells have true ones")]
     Lengths,
+    #[error(
+        "steps of {step_world} over {length} world units of cells, {distance} away: rays may have {} segments, counted in 48 bits",
+        CellsPlan::MAX_SEGMENTS
+    )]
+    Steps { step_world: f64, length: f64, distance: f64 },
     #[error("a surface of {} x {} pixels behind a picture of {} x {}", behind.x, behind.y, size.x, size.y)]
     BehindSize { behind: UVec2, size: UVec2 },
     #[error("pixel ({}, {}) of the surface behind is {value:?}; it must be finite, and its distance 0 or more", pixel.x, pixel.y)]
@@ -59,10 +64,14 @@ pub enum CellsPlanError {
 }
 
 impl CellsPlan {
+    /// The most segments of a ray.
+    pub const MAX_SEGMENTS: f64 = (1 << 24) as f64;
+
     /// The plan of a picture of cells.
     ///
     /// # Errors
-    /// No pixels; segments that end with bricks, or nominal lengths; a surface of another size, or with numbers that are not finite.
+    /// No pixels; segments that end with bricks, or nominal lengths; too many segments; a surface of another size, or with numbers that are
+    /// not finite.
     pub fn new(cells: Arc<Cells>, view: CellsView) -> Result<CellsPlan, CellsPlanError> {
         let CellsView { camera, size, sampling, transfer, behind } = view;
         if size.min_element() == 0 {
@@ -75,6 +84,11 @@ impl CellsPlan {
             return Err(CellsPlanError::Lengths);
         }
         behind.as_deref().map_or(Ok(()), |behind| check_behind(behind, size))?;
+        let (length, step_world) = (2.0 * cells.radius(), sampling.step_world());
+        let distance = (camera.eye() - cells.center()).length();
+        if length > step_world * CellsPlan::MAX_SEGMENTS || distance + length > step_world * 2f64.powi(48) {
+            return Err(CellsPlanError::Steps { step_world, length, distance });
+        }
         let rays = ViewRays::new(&camera, size, cells.center(), cells.radius());
         Ok(CellsPlan { cells, rays, sampling, transfer, behind })
     }
@@ -161,6 +175,8 @@ mod tests {
         assert!(error(CellsView { sampling, ..view.clone() }).contains("bricks"));
         let sampling = view.sampling.weighted(Lengths::Nominal).unwrap();
         assert!(error(CellsView { sampling, ..view.clone() }).contains("nominal"));
+        let sampling = Sampling::new(1e-8, QuadratureRule::MidpointExponential, Mode::Exact).unwrap();
+        assert!(error(CellsView { sampling, ..view.clone() }).starts_with("steps of 0.00000001 over 1.7"));
         let behind = |size, pixels| Some(Arc::new(Image::new(size, pixels).unwrap()));
         let small = behind(UVec2::ONE, vec![[0.0; 4]]);
         assert!(error(CellsView { behind: small, ..view.clone() }).contains("1 x 1 pixels behind"));

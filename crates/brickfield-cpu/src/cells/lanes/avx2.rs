@@ -9,12 +9,12 @@ use pulp::x86::V3;
 use super::{Areas, EDGES, FACE_CORNERS, Lanes, N_EDGES, Rows, UNSURE};
 
 /// The lower, and the upper, corners of eight edges each.
-const ENDS: [[[i32; 8]; 3]; 2] = {
-    let mut ends = [[[0; 8]; 3]; 2];
+const ENDS: [[[i32; 8]; 2]; 3] = {
+    let mut ends = [[[0; 8]; 2]; 3];
     let mut i = 0;
     while i < 24 {
-        ends[0][i / 8][i % 8] = EDGES[i][0] as i32;
-        ends[1][i / 8][i % 8] = EDGES[i][1] as i32;
+        ends[i / 8][0][i % 8] = EDGES[i][0] as i32;
+        ends[i / 8][1][i % 8] = EDGES[i][1] as i32;
         i += 1;
     }
     ends
@@ -89,8 +89,7 @@ impl Lanes for V3 {
         let mut areas = Areas { areas: [0.0; 24], signs: 0, is_unsure: false };
         let mut unsure = avx._mm256_setzero_ps();
         let magnitude: __m256 = cast([0x7fff_ffffu32; 8]);
-        for group in 0..3 {
-            let (low, high) = (&ENDS[0][group], &ENDS[1][group]);
+        for (group, [low, high]) in ENDS.iter().enumerate() {
             let less = avx._mm256_mul_ps(permute(self, u, high), permute(self, v, low));
             let area = fma._mm256_fmsub_ps(permute(self, u, low), permute(self, v, high), less);
             let own: [f32; 8] = cast(area);
