@@ -11,16 +11,16 @@ use crate::grids::*;
 fn layers(jump: f64) -> TransferFunction {
     let knots = vec![
         knot(-1.5, 0.5, [1.0, 0.1, 0.3]),
-        knot(-0.2, 0.0, [1.0, 1.0, 0.4]),
-        knot(0.1, 0.0, [0.0, 1.0, 0.4]),
-        knot(0.3, 6.0, [0.0, 0.0, 1.0]),
+        knot(-0.6, 0.0, [1.0, 1.0, 0.4]),
+        knot(0.5, 0.0, [0.0, 1.0, 0.4]),
+        knot(0.6, 6.0, [0.0, 0.0, 1.0]),
         knot(1.0, 6.0 + jump, [0.9, 0.9, 1.0]),
     ];
     TransferFunction::new(knots).unwrap()
 }
 
 fn waves(p: DVec3) -> f64 {
-    (5.0 * p.x).sin() + (4.0 * p.y).cos() * (3.0 * p.z + 0.5).sin()
+    (2.5 * p.x).sin() + (2.0 * p.y).cos() * (2.0 * p.z + 0.5).sin()
 }
 
 fn grid(kind: u32, seed: u64) -> Nodes {
