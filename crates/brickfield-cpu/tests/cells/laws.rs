@@ -126,6 +126,27 @@ fn cells_at_holes_are_left_out() {
     }
 }
 
+/// A layer of nodes that is there twice, with other cells' values between, has no way in it.
+#[test]
+fn cells_without_volume_add_nothing() {
+    let even = |n: UVec3, layers: [u32; 3]| {
+        let at = move |node: UVec3| {
+            let index = [0, 1, 2].map(|axis| node[axis] - u32::from(node[axis] > layers[axis]));
+            shear() * UVec3::from(index).as_dvec3()
+        };
+        Nodes::new(n, at, waves)
+    };
+    let plain = even(UVec3::new(4, 3, 5), [9; 3]);
+    let view = view(framing(&plain, FROM), 32, peaks(), 0.05);
+    let expected = discrete_cells(&plan(&plain, &view)).image;
+    for layers in [[2, 9, 9], [9, 0, 9], [9, 9, 4], [1, 2, 3]] {
+        let n = UVec3::new(4, 3, 5) + UVec3::from(layers.map(|layer| u32::from(layer < 9)));
+        for (image, _) in both(&plan(&even(n, layers), &view)) {
+            assert!(greatest_difference(&image, &expected) < 1e-5, "{layers:?}");
+        }
+    }
+}
+
 #[test]
 fn a_left_handed_grid_has_the_picture_of_the_right_handed_one() {
     let nodes = ring(UVec3::new(5, 16, 4), 0.5, waves);
