@@ -28,7 +28,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("brickfield-serve", &[]),
     ("brickfield-frame", &["core", "optics", "haar"]),
     ("brickfield-shaders", &["core", "optics", "frame"]),
-    ("brickfield-cpu", &["core", "optics", "interp", "frame"]),
+    ("brickfield-cpu", &["core", "optics", "interp", "curvilinear", "frame"]),
     ("brickfield-wgpu", &["core", "frame", "shaders"]),
     ("brickfield-ash", &["core", "frame", "shaders"]),
     ("brickfield", BELOW),

@@ -1,11 +1,11 @@
-//! Times of rays through cells: `cargo bench -p brickfield-curvilinear --profile dev --bench walk`.
+//! Times of rays through cells, and of octrees over them: `cargo bench -p brickfield-curvilinear --profile dev --bench walk`.
 
 use std::f64::consts::TAU;
 use std::time::Instant;
 
 use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use brickfield_core::{Aabb, Camera};
-use brickfield_curvilinear::{CellWalker, CurvilinearVolume};
+use brickfield_curvilinear::{CellWalker, CurvilinearVolume, OctTree};
 
 fn main() {
     let n = UVec3::new(64, 192, 64);
@@ -29,6 +29,21 @@ fn main() {
     println!(
         "{} rays, {n_segments} cells: {median:.0} ns a cell ({least:.0} to {most:.0}), one thread",
         size.x * size.y
+    );
+    octree(walker.volume().clone());
+}
+
+/// The hierarchy over the same cells, by all threads.
+fn octree(volume: CurvilinearVolume) {
+    let values: Vec<f32> = volume.positions().iter().map(|p| (3.0 * p.x).sin() as f32 + (p.y * p.z) as f32).collect();
+    let start = Instant::now();
+    let tree = OctTree::build(volume, values).expect("a value for each node");
+    let (seconds, account) = (start.elapsed().as_secs_f64(), tree.byte_account());
+    println!(
+        "an octree of {} zones above level 0, {} bytes each, {:.3} of the data, made in {seconds:.2} s",
+        account.n_stored_zones,
+        account.bytes_per_zone,
+        account.ratio()
     );
 }
 

@@ -87,7 +87,20 @@ impl CurvilinearVolume {
         (map.position(local).distance(position) <= size * 2f64.powi(-36)).then_some(local)
     }
 
-    fn node(&self, i: usize) -> UVec3 {
+    /// The local coordinates of a position in a cell, limited to 0 to 1: [`CellSegment`](crate::CellSegment) has them at its ends.
+    ///
+    /// Of a position beside the cell, or where the map is singular, they are near ones.
+    pub fn local_inside(&self, cell: UVec3, position: DVec3) -> DVec3 {
+        CellMap::new(&self.corners(cell)).local_inside(position, DVec3::splat(0.5))
+    }
+
+    /// The number of a node.
+    pub(crate) fn number(&self, node: UVec3) -> usize {
+        let [nx, ny, _] = self.n_cells().to_array().map(|n| n as usize + 1);
+        node.x as usize + nx * (node.y as usize + ny * node.z as usize)
+    }
+
+    pub(crate) fn node(&self, i: usize) -> UVec3 {
         let [nx, ny, _] = self.n_cells().to_array().map(|n| n as usize + 1);
         UVec3::new((i % nx) as u32, (i / nx % ny) as u32, (i / nx / ny) as u32)
     }
@@ -115,6 +128,11 @@ impl CellMap {
             y + xy * u + yz * w + xyz * (u * w),
             z + xz * u + yz * v + xyz * (u * v),
         )
+    }
+
+    /// Newton's method, limited to the cell.
+    pub(crate) fn local_inside(&self, position: DVec3, guess: DVec3) -> DVec3 {
+        self.local(position, guess).clamp(DVec3::ZERO, DVec3::ONE)
     }
 
     /// Newton's method from a guess. Steps are halved until they come nearer; where the map is singular it ends at the nearest point that

@@ -2,6 +2,7 @@
 
 mod adapter;
 mod backend;
+mod cells;
 mod content;
 mod facets;
 mod feature;
@@ -29,6 +30,9 @@ pub use backend::{
     check_memory, draw_batches,
 };
 pub use brickfield_optics::QuadratureRule;
+pub use cells::{
+    CellFace, CellNode, Cells, CellsBackend, CellsError, CellsPlan, CellsPlanError, CellsView, FaceBox, Handedness,
+};
 pub use content::{Chunk, Chunked, ContentId, HeldChunks};
 pub use feature::{Feature, FeatureSet};
 pub use field::{

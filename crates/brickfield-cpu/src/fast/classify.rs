@@ -5,14 +5,14 @@ use brickfield_frame::ValueScale;
 
 /// Extinction and straight colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Optics32 {
-    pub(super) extinction: f32,
-    pub(super) color: [f32; 3],
+pub(crate) struct Optics32 {
+    pub(crate) extinction: f32,
+    pub(crate) color: [f32; 3],
 }
 
 /// A stretch of values in which the transfer function is linear.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stretch {
+pub(crate) struct Stretch {
     start: f32,
     /// Reciprocal of the stretch's length; 0 where the function is constant.
     reciprocal: f32,
@@ -25,20 +25,20 @@ pub(super) struct Stretch {
 /// Stretch i lies between knots i - 1 and i: the first and the last reach to infinity and are constant. A table over the
 /// values says where the search for a value's stretch begins.
 #[derive(Clone, Debug)]
-pub(super) struct Classifier {
+pub(crate) struct Classifier {
     stretches: Vec<Stretch>,
     /// The knots' values, and infinity.
     ends: Vec<f32>,
     bins: [u32; N_BINS],
     bins_per_value: f32,
     /// How values are counted.
-    pub(super) values: ValueScale,
+    pub(crate) values: ValueScale,
 }
 
 const N_BINS: usize = 256;
 
 impl Classifier {
-    pub(super) fn new(transfer: &TransferFunction, values: ValueScale) -> Classifier {
+    pub(crate) fn new(transfer: &TransferFunction, values: ValueScale) -> Classifier {
         let knots = transfer.knots();
         let relative = |k: &Knot| values.number(k.value) as f32;
         let (first, last) = (&knots[0], &knots[knots.len() - 1]);
@@ -57,13 +57,13 @@ impl Classifier {
 
     /// Extinction and colour at a value; right-continuous at jumps.
     #[inline(always)]
-    pub(super) fn at(&self, value: f32) -> Optics32 {
+    pub(crate) fn at(&self, value: f32) -> Optics32 {
         self.on(self.stretch(value), value)
     }
 
     /// The stretch that a value lies in; infinity and NaN are in the last.
     #[inline(always)]
-    pub(super) fn stretch(&self, value: f32) -> usize {
+    pub(crate) fn stretch(&self, value: f32) -> usize {
         let value = value.min(f32::MAX);
         let bin = (value * self.bins_per_value).clamp(0.0, (N_BINS - 1) as f32) as usize;
         let mut i = self.bins[bin & (N_BINS - 1)] as usize;
@@ -75,7 +75,7 @@ impl Classifier {
 
     /// The linear function of stretch `i` at a value: at its ends, the limits from within.
     #[inline(always)]
-    pub(super) fn on(&self, i: usize, value: f32) -> Optics32 {
+    pub(crate) fn on(&self, i: usize, value: f32) -> Optics32 {
         let s = &self.stretches[i];
         let f = s.place(value);
         let [r, g, b, _] = s.rgba(1.0 - f, f);
@@ -84,25 +84,25 @@ impl Classifier {
 
     /// Stretch `i`.
     #[inline(always)]
-    pub(super) fn linear(&self, i: usize) -> &Stretch {
+    pub(crate) fn linear(&self, i: usize) -> &Stretch {
         &self.stretches[i]
     }
 
     /// Whether nothing of stretch `i` is visible.
     #[inline(always)]
-    pub(super) fn is_dark(&self, i: usize) -> bool {
+    pub(crate) fn is_dark(&self, i: usize) -> bool {
         self.stretches[i].low[3] + self.stretches[i].high[3] == 0.0
     }
 
     /// The value at the lower end of stretch `i`, which is not the first.
     #[inline(always)]
-    pub(super) fn start(&self, i: usize) -> f32 {
+    pub(crate) fn start(&self, i: usize) -> f32 {
         self.stretches[i].start
     }
 
     /// The value at the upper end of stretch `i`; infinity for the last.
     #[inline(always)]
-    pub(super) fn end(&self, i: usize) -> f32 {
+    pub(crate) fn end(&self, i: usize) -> f32 {
         self.ends[i]
     }
 }
@@ -110,7 +110,7 @@ impl Classifier {
 impl Stretch {
     /// Where a value lies, from 0 at the lower end to 1 at the upper.
     #[inline(always)]
-    pub(super) fn place(&self, value: f32) -> f32 {
+    pub(crate) fn place(&self, value: f32) -> f32 {
         let f = (value - self.start) * self.reciprocal;
         let f = if f > 0.0 { f } else { 0.0 };
         if f < 1.0 { f } else { 1.0 }
@@ -118,13 +118,13 @@ impl Stretch {
 
     /// Extinction at a place.
     #[inline(always)]
-    pub(super) fn extinction(&self, place: f32) -> f32 {
+    pub(crate) fn extinction(&self, place: f32) -> f32 {
         self.low[3] * (1.0 - place) + self.high[3] * place
     }
 
     /// The ends' colours with the given weights, and the weights' sum.
     #[inline(always)]
-    pub(super) fn rgba(&self, low: f32, high: f32) -> [f32; 4] {
+    pub(crate) fn rgba(&self, low: f32, high: f32) -> [f32; 4] {
         let mix = |c: usize| self.low[c] * low + self.high[c] * high;
         [mix(0), mix(1), mix(2), low + high]
     }

@@ -2,7 +2,7 @@
 
 mod batch;
 mod brick;
-mod classify;
+pub(crate) mod classify;
 mod detail;
 mod f32_plan;
 mod light;
@@ -10,7 +10,7 @@ mod march;
 mod placed;
 mod prefiltered;
 mod scalar;
-mod segment;
+pub(crate) mod segment;
 mod single;
 
 use std::ops::Range;
@@ -332,14 +332,14 @@ fn weights(plan: &FramePlan, position: [f32; 3]) -> Option<[[f32; 4]; 2]> {
 }
 
 /// Refuses pictures that are too large.
-fn check(size: UVec2) -> Result<(), RenderError> {
+pub(crate) fn check(size: UVec2) -> Result<(), RenderError> {
     if size.max_element() > MAX_IMAGE {
         return Err(RenderError::ImageTooLarge { size, limit: MAX_IMAGE });
     }
     Ok(())
 }
 
-fn milliseconds(since: Instant) -> f64 {
+pub(crate) fn milliseconds(since: Instant) -> f64 {
     since.elapsed().as_secs_f64() * 1e3
 }
 

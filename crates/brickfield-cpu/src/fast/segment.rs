@@ -8,17 +8,17 @@ use super::scalar::{alpha, depth, exp_minus};
 
 /// Depth, opacity and emission of a segment.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Segment32 {
-    pub(super) depth: f32,
-    pub(super) alpha: f32,
-    pub(super) emission: [f32; 3],
+pub(crate) struct Segment32 {
+    pub(crate) depth: f32,
+    pub(crate) alpha: f32,
+    pub(crate) emission: [f32; 3],
 }
 
 /// A ray's state: transmittance and premultiplied RGBA, accumulated in f64 so that thousands of segments cost no digits.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ray32 {
-    pub(super) transmittance: f64,
-    pub(super) rgba: [f64; 4],
+pub(crate) struct Ray32 {
+    pub(crate) transmittance: f64,
+    pub(crate) rgba: [f64; 4],
 }
 
 impl Default for Ray32 {
@@ -30,7 +30,7 @@ impl Default for Ray32 {
 impl Ray32 {
     /// Puts a segment behind what has been seen so far.
     #[inline(always)]
-    pub(super) fn push(&mut self, s: Segment32) {
+    pub(crate) fn push(&mut self, s: Segment32) {
         let t = self.transmittance as f32;
         let [r, g, b] = s.emission;
         for (sum, x) in self.rgba.iter_mut().zip([r, g, b, s.alpha]) {
@@ -40,19 +40,19 @@ impl Ray32 {
     }
 
     /// This ray, and behind it one that goes on.
-    pub(super) fn before(&self, behind: &Ray32) -> Ray32 {
+    pub(crate) fn before(&self, behind: &Ray32) -> Ray32 {
         let sum = |i: usize| self.rgba[i] + self.transmittance * behind.rgba[i];
         Ray32 { transmittance: self.transmittance * behind.transmittance, rgba: std::array::from_fn(sum) }
     }
 
     /// Whether nothing, or less than a floor, shines through any more.
     #[inline(always)]
-    pub(super) fn has_ended(&self, floor: f64) -> bool {
+    pub(crate) fn has_ended(&self, floor: f64) -> bool {
         self.transmittance < floor || self.transmittance == 0.0
     }
 
     /// The pixel: alpha at most 1, colours at most `brightest`.
-    pub(super) fn rgba(&self, brightest: f32) -> [f32; 4] {
+    pub(crate) fn rgba(&self, brightest: f32) -> [f32; 4] {
         let [r, g, b, a] = self.rgba.map(|x| x as f32);
         [r.min(brightest), g.min(brightest), b.min(brightest), a.min(1.0)]
     }
@@ -60,7 +60,7 @@ impl Ray32 {
 
 /// A segment with the given values at its nodes (`None`: extinction 0), as numbers of the value scale.
 #[inline(always)]
-pub(super) fn segment(rule: QuadratureRule, transfer: &Classifier, values: [Option<f32>; 2], length: f32) -> Segment32 {
+pub(crate) fn segment(rule: QuadratureRule, transfer: &Classifier, values: [Option<f32>; 2], length: f32) -> Segment32 {
     match (rule, values) {
         (QuadratureRule::Gauss2, [a, b]) => gauss2(optics(transfer, a), optics(transfer, b), length),
         (QuadratureRule::PreIntegrated, [Some(a), Some(b)]) => preintegrated(transfer, a, b, length),
@@ -89,7 +89,7 @@ pub(super) fn lit_segment(
 }
 
 /// A segment whose nodes have the given optics (`None`: extinction 0), by a rule that looks at nodes alone.
-pub(super) fn segment_of(rule: QuadratureRule, nodes: [Option<Optics32>; 2], length: f32) -> Segment32 {
+pub(crate) fn segment_of(rule: QuadratureRule, nodes: [Option<Optics32>; 2], length: f32) -> Segment32 {
     match (rule, nodes) {
         (QuadratureRule::Gauss2, [a, b]) => gauss2(a.unwrap_or_default(), b.unwrap_or_default(), length),
         (QuadratureRule::LeftRiemann, [Some(o), _]) => euler(o, length),
@@ -110,7 +110,7 @@ fn euler(o: Optics32, length: f32) -> Segment32 {
 }
 
 #[inline(always)]
-pub(super) fn exponential(o: Optics32, length: f32) -> Segment32 {
+pub(crate) fn exponential(o: Optics32, length: f32) -> Segment32 {
     let depth = o.extinction * length;
     let a = alpha(depth);
     Segment32 { depth, alpha: a, emission: o.color.map(|c| a * c) }

@@ -3,7 +3,9 @@
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, Level, Ray};
 
-use super::faces::{Face, Half, triangle};
+use super::Voids;
+use super::faces::Face;
+use super::inner::{triangles, under};
 use crate::{CurvilinearVolume, QuadLayout, Zone};
 
 /// The faces of one side, in the levels of a quadtree, each zone with a box.
@@ -45,17 +47,10 @@ impl BoundarySide {
     }
 
     /// The part of the volume under this side, by the divergence theorem: a sixth of the sum of determinants of its triangles.
-    pub(crate) fn signed_volume(&self, volume: &CurvilinearVolume, center: DVec3) -> f64 {
+    pub(crate) fn signed_volume(&self, volume: &CurvilinearVolume, voids: &Voids, center: DVec3) -> f64 {
         let zones = (0..self.layout.n_zones(Level(0))).map(|i| self.layout.zone_at(Level(0), i));
-        let of_face = |zone| {
-            let corners = volume.corners(self.cell(zone)).map(|p| p - center);
-            let of_half = |part| {
-                let [a, b, c] = triangle(Half { face: self.face, part }).map(|i| corners[i]);
-                a.dot(b.cross(c)) / 6.0
-            };
-            of_half(0) + of_half(1)
-        };
-        zones.map(of_face).sum()
+        let kept = zones.map(|zone| self.cell(zone)).filter(|cell| !voids.contains(*cell));
+        kept.flat_map(|cell| triangles(volume, cell, self.face)).map(|triangle| under(triangle, center)).sum()
     }
 
     /// The cell at a face of the side.
@@ -69,9 +64,7 @@ impl BoundarySide {
 
     fn box_of(&self, volume: &CurvilinearVolume, zone: Zone, margin: f64) -> Aabb {
         if zone.level == Level(0) {
-            let corners = volume.corners(self.cell(zone));
-            let halves = [0, 1].map(|part| triangle(Half { face: self.face, part }));
-            let around = Aabb::of_points(halves.into_iter().flatten().map(|i| corners[i]));
+            let around = Aabb::of_points(triangles(volume, self.cell(zone), self.face).into_iter().flatten());
             return Aabb { min: around.min - margin, max: around.max + margin };
         }
         let below = &self.boxes[usize::from(zone.level.0) - 1];
@@ -86,7 +79,7 @@ fn across(face: Face) -> [usize; 2] {
 }
 
 /// Whether the line through a ray meets a box, on either side of the ray's origin.
-fn meets(ray: &Ray, around: &Aabb) -> bool {
+pub(crate) fn meets(ray: &Ray, around: &Aabb) -> bool {
     let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
     for axis in 0..3 {
         let (o, d) = (ray.origin[axis], ray.direction[axis]);

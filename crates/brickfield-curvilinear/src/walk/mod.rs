@@ -2,6 +2,7 @@
 
 mod boundary;
 mod faces;
+mod inner;
 mod lattice;
 
 use brickfield_core::glam::{DVec3, UVec3};
@@ -9,6 +10,7 @@ use brickfield_core::{Aabb, Ray};
 
 use boundary::BoundarySide;
 use faces::{Cell, Half, neighbour, opposite};
+use inner::InnerFaces;
 use lattice::{Lattice, Line};
 
 use crate::volume::CellMap;
@@ -25,7 +27,36 @@ pub struct CellWalker {
     volume: CurvilinearVolume,
     lattice: Lattice,
     sides: [BoundarySide; 6],
+    voids: Voids,
+    inner: InnerFaces,
     is_right_handed: bool,
+}
+
+/// The cells that a volume is without.
+#[derive(Clone, Debug, PartialEq)]
+struct Voids {
+    n_cells: UVec3,
+    /// One mark for each cell; none if there is no void.
+    marks: Vec<bool>,
+}
+
+impl Voids {
+    fn of(volume: &CurvilinearVolume, is_void: impl Fn(UVec3) -> bool) -> Voids {
+        let n_cells = volume.n_cells();
+        let marks: Vec<bool> = cells(n_cells).map(is_void).collect();
+        Voids { n_cells, marks: if marks.contains(&true) { marks } else { Vec::new() } }
+    }
+
+    fn contains(&self, cell: UVec3) -> bool {
+        let [nx, ny, _] = self.n_cells.to_array().map(|n| n as usize);
+        let number = cell.x as usize + nx * (cell.y as usize + ny * cell.z as usize);
+        self.marks.get(number).is_some_and(|mark| *mark)
+    }
+}
+
+/// All cells of a grid, x varying fastest.
+fn cells(n: UVec3) -> impl Iterator<Item = UVec3> {
+    (0..n.z).flat_map(move |z| (0..n.y).flat_map(move |y| (0..n.x).map(move |x| UVec3::new(x, y, z))))
 }
 
 /// The part of a ray in one cell.
@@ -33,6 +64,8 @@ pub struct CellWalker {
 #[allow(missing_docs)]
 pub struct CellSegment {
     pub cell: UVec3,
+    /// How often the whole line has entered the volume before: a row of cells that follow each other has one number.
+    pub run: u32,
     /// Where the ray enters and leaves, in units of its direction: t_in < t_out. In a row of cells t_in is the t_out before.
     pub t_in: f64,
     pub t_out: f64,
@@ -67,16 +100,32 @@ impl CellWalker {
     /// # Errors
     /// Cells without volume.
     pub fn new(volume: CurvilinearVolume) -> Result<CellWalker, CellWalkerError> {
+        CellWalker::with_voids(volume, |_| false)
+    }
+
+    /// The same of a volume without some of its cells: rays leave it at their faces, and enter it again behind them.
+    ///
+    /// # Errors
+    /// Cells without volume, or no cells at all.
+    pub fn with_voids(
+        volume: CurvilinearVolume,
+        is_void: impl Fn(UVec3) -> bool,
+    ) -> Result<CellWalker, CellWalkerError> {
         let extent = Aabb::of_points(volume.positions().iter().copied());
         // Lattices move points by 2^-38 of half the extent, and directions by as much.
         let margin = extent.diagonal() * 2f64.powi(-34);
         let side = |face| BoundarySide::new(&volume, face, margin);
         let sides = [side(0)?, side(1)?, side(2)?, side(3)?, side(4)?, side(5)?];
-        let signed: f64 = sides.iter().map(|side| side.signed_volume(&volume, extent.center())).sum();
+        let voids = Voids::of(&volume, is_void);
+        let inner = InnerFaces::of(&volume, &voids, margin);
+        let center = extent.center();
+        let of_sides: f64 = sides.iter().map(|side| side.signed_volume(&volume, &voids, center)).sum();
+        let signed = 0.0 + of_sides + inner.signed_volume(&volume, center);
         if signed == 0.0 || !signed.is_finite() {
             return Err(CellWalkerError::Flat { volume: signed });
         }
-        Ok(CellWalker { lattice: Lattice::over(&extent), sides, is_right_handed: signed > 0.0, volume })
+        let is_right_handed = signed > 0.0;
+        Ok(CellWalker { lattice: Lattice::over(&extent), sides, voids, inner, is_right_handed, volume })
     }
 
     /// The volume that is walked.
@@ -96,23 +145,29 @@ impl CellWalker {
         let mut entries = line.as_ref().map_or_else(Vec::new, |line| self.entries(ray, line));
         // The first entry is taken last.
         entries.sort_by(|a, b| b.t.total_cmp(&a.t));
-        Ok(CellWalk { walker: self, ray: *ray, line, entries, here: None, t: f64::NEG_INFINITY })
+        Ok(CellWalk { walker: self, ray: *ray, line, entries, here: None, t: f64::NEG_INFINITY, n_entered: 0 })
     }
 
     /// Where the whole line enters the volume.
     fn entries(&self, ray: &Ray, line: &Line) -> Vec<Entry> {
         let (mut entries, near) = (Vec::new(), line.ray());
+        let mut visit = |cell, face| {
+            let corners = Cell::of(&self.volume, cell, line, ray);
+            for half in [0, 1].map(|part| Half { face, part }) {
+                let crossing = corners.crossing(line, half);
+                if let Some(crossing) = crossing.filter(|crossing| crossing.leaves != self.is_right_handed) {
+                    entries.push(Entry { cell, half, t: crossing.t });
+                }
+            }
+        };
         for side in &self.sides {
             side.visit(&near, &mut |cell, face| {
-                let corners = Cell::of(&self.volume, cell, line, ray);
-                for half in [0, 1].map(|part| Half { face, part }) {
-                    let crossing = corners.crossing(line, half);
-                    if let Some(crossing) = crossing.filter(|crossing| crossing.leaves != self.is_right_handed) {
-                        entries.push(Entry { cell, half, t: crossing.t });
-                    }
+                if !self.voids.contains(cell) {
+                    visit(cell, face);
                 }
             });
         }
+        self.inner.visit(&near, &mut visit);
         entries
     }
 
@@ -149,18 +204,26 @@ pub struct CellWalk<'a> {
     here: Option<Entry>,
     /// Where the last cell was left.
     t: f64,
+    n_entered: u32,
 }
 
 impl CellWalk<'_> {
     /// The next cell of the whole line, and where it is entered and left.
     fn step(&mut self) -> Option<(UVec3, f64, f64)> {
-        let entry = self.here.take().or_else(|| self.entries.pop())?;
+        let entry = match self.here.take() {
+            Some(here) => here,
+            None => {
+                self.n_entered += 1;
+                self.entries.pop()?
+            }
+        };
         let exit = self.walker.exit(&self.ray, self.line.as_ref()?, &entry)?;
         let t_in = entry.t.max(self.t);
         // In a cell that is folded the exit may come before the entry.
         let t_out = exit.t.max(t_in);
         self.t = t_out;
         let next = neighbour(exit.cell, exit.half.face, self.walker.volume.n_cells());
+        let next = next.filter(|cell| !self.walker.voids.contains(*cell));
         self.here = next.map(|cell| Entry { cell, half: opposite(exit.half), t: exit.t });
         Some((entry.cell, t_in, t_out))
     }
@@ -175,9 +238,10 @@ impl Iterator for CellWalk<'_> {
             let t_in = t_in.max(0.0);
             if t_in < t_out {
                 let map = CellMap::new(&self.walker.volume.corners(cell));
-                let local = |t, guess| map.local(self.ray.at(t), guess).clamp(DVec3::ZERO, DVec3::ONE);
+                let local = |t, guess| map.local_inside(self.ray.at(t), guess);
                 let local_in = local(t_in, DVec3::splat(0.5));
-                return Some(CellSegment { cell, t_in, t_out, local_in, local_out: local(t_out, local_in) });
+                let run = self.n_entered - 1;
+                return Some(CellSegment { cell, run, t_in, t_out, local_in, local_out: local(t_out, local_in) });
             }
         }
     }

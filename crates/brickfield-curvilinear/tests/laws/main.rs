@@ -4,6 +4,7 @@ mod frame_rate;
 mod grids;
 mod layout;
 mod mesh;
+mod oct_tree;
 mod octree;
 mod select;
 mod tree;

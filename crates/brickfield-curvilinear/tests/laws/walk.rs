@@ -189,6 +189,40 @@ fn rays_along_edges_faces_and_diagonals_of_even_cells() {
     }
 }
 
+/// The chord of a ray in a grid of unit cells without some of them: between the planes of all axes, the middle of each piece decides.
+fn chord_without(ray: &Ray, n: UVec3, is_void: impl Fn(UVec3) -> bool) -> f64 {
+    let planes = (0..3).flat_map(|axis| (0..=n[axis]).map(move |i| (axis, f64::from(i))));
+    let mut t: Vec<f64> = planes.map(|(axis, x)| (x - ray.origin[axis]) / ray.direction[axis]).collect();
+    t.push(0.0);
+    t.sort_by(f64::total_cmp);
+    let is_inside = |t: f64| located(ray.at(t), n).is_some_and(|(cell, _)| !is_void(cell));
+    let pieces = t.windows(2).filter(|t| t[0] >= 0.0 && is_inside(0.5 * (t[0] + t[1])));
+    pieces.map(|t| t[1] - t[0]).sum()
+}
+
+proptest! {
+    #[test]
+    fn rays_leave_at_voids_and_enter_behind_them(eye in points(-3.0, 8.0), aim in points(0.0, 5.0), seed in any::<u64>()) {
+        let n = UVec3::new(5, 4, 6);
+        let is_void = |cell: UVec3| seed >> ((cell.x + 7 * cell.y + 13 * cell.z) % 61) & 3 == 3;
+        let walker = CellWalker::with_voids(volume(n, |node| node.as_dvec3()), is_void).unwrap();
+        let ray = Ray { origin: eye, direction: aim - eye };
+        let segments = walk(&walker, &ray);
+        prop_assert!(segments.iter().all(|s| !is_void(s.cell)));
+        prop_assert!(segments.windows(2).all(|s| s[0].t_out <= s[1].t_in));
+        let total: f64 = segments.iter().map(|s| s.t_out - s.t_in).sum();
+        prop_assert!((total - chord_without(&ray, n, is_void)).abs() < 1e-8);
+    }
+}
+
+#[test]
+fn a_volume_of_voids_alone_is_refused() {
+    let grid = volume(UVec3::ONE, |node| node.as_dvec3());
+    assert!(
+        CellWalker::with_voids(grid, |_| true).unwrap_err().to_string().starts_with("the cells have a volume of 0")
+    );
+}
+
 #[test]
 fn a_ray_from_inside_starts_at_zero() {
     let (walker, _) = sheared(UVec3::splat(4), DMat3::IDENTITY);

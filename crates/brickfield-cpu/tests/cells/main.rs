@@ -1,0 +1,9 @@
+//! Laws of pictures of curvilinear cells: closed forms, orders of accuracy, and both renderers against each other.
+
+mod agreement;
+mod closed_forms;
+mod grids;
+mod laws;
+mod orders;
+#[path = "../support/mod.rs"]
+mod support;
