@@ -29,7 +29,7 @@ pub struct AshBackend {
     pub(crate) pipelines: Pipelines<Pipeline>,
     pub(crate) resources: Resources,
     pub(crate) staging: Staging,
-    picture: Option<VulkanImage>,
+    pub(crate) picture: Option<VulkanImage>,
     pub(crate) canvas: Option<Canvas>,
     polygons: Polygons,
     description: Description,
@@ -189,7 +189,7 @@ fn pipelines(device: &Arc<Device>, library: ShaderLibrary) -> Pipelines<Pipeline
     })
 }
 
-fn timing(upload_ms: f64, time: &RenderTime) -> Timing {
+pub(crate) fn timing(upload_ms: f64, time: &RenderTime) -> Timing {
     Timing { upload_ms, device_ms: time.device_ms, wall_ms: time.wall_ms, read_back_ms: 0.0 }
 }
 

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod backend;
+mod cells;
 mod decode;
 mod error;
 mod evaluate;

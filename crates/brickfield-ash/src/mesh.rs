@@ -20,7 +20,8 @@ impl MeshBackend for AshBackend {
         let started = Instant::now();
         let pipeline = self.pipelines.of(PipelineKey::mesh(plan))?;
         let bindings = pipeline.bindings().to_vec();
-        let uploaded_bytes = self.resources.bring_mesh(&mut self.queue, &mut self.staging, plan, &bindings)?;
+        let uploaded_bytes =
+            self.resources.bring_contents(&mut self.queue, &mut self.staging, &|r| plan.content(r), &bindings)?;
         let canvas = reserve_canvas(&mut self.canvas, &self.device, CanvasKind::Mesh, plan.size())?;
         let resources = &self.resources;
         let bound = pipeline.bind(|binding| resources.bindable(binding))?;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use ash::vk;
 use brickfield_core::BrickSide;
 use brickfield_frame::{
-    AtlasShape, Chunked, Content, FramePlan, FrameUniforms, HeldChunks, MeshPlan, RenderError, Resource, Slots,
+    AtlasShape, Chunked, Content, FramePlan, FrameUniforms, HeldChunks, RenderError, Resource, Slots,
 };
 use brickfield_shaders::{Binding, BindingKind, PipelineKey, Pipelines, decodings};
 
@@ -112,19 +112,20 @@ impl Resources {
         Ok(Brought { uniforms, n_bytes })
     }
 
-    /// As [`bring`](Self::bring), of a mesh; the bytes that were brought.
-    pub(crate) fn bring_mesh(
+    /// Brings the numbers and lists of another plan, as `contents` has them, that a shader of these bindings reads; the bytes that were brought.
+    pub(crate) fn bring_contents<'a>(
         &mut self,
         queue: &mut Queue,
         staging: &mut Staging,
-        plan: &MeshPlan,
+        contents: &dyn Fn(Resource) -> Option<Content<'a>>,
         bindings: &[Binding],
     ) -> Result<u64, RenderError> {
         let (mut numbers, mut lists) = (Vec::new(), Vec::new());
         for Binding { resource, .. } in bindings {
-            match plan.content(*resource) {
+            match contents(*resource) {
                 Some(Content::Bytes(bytes)) => numbers.push((*resource, bytes)),
                 Some(Content::Chunks(chunks)) => lists.push((*resource, chunks)),
+                None if *resource == Resource::Picture => {}
                 Some(Content::Texture(_)) | None => return Err(missing(*resource)),
             }
         }

@@ -3,12 +3,12 @@
 use brickfield_core::Image;
 use brickfield_core::glam::{UVec2, UVec3};
 
-use crate::{FramePlan, MeshBackend};
+use crate::{CellsBackend, FramePlan, MeshBackend};
 
-/// Replays frame plans, and draws meshes; decides nothing.
+/// Replays frame plans, and draws meshes and curvilinear cells; decides nothing.
 ///
 /// A backend may move to another thread: a viewer renders on a thread of its own. It is not shared between threads.
-pub trait Backend: MeshBackend + Send {
+pub trait Backend: MeshBackend + CellsBackend + Send {
     /// The backend's name, adapter, driver and capabilities.
     fn describe(&self) -> &Description;
 

@@ -31,7 +31,8 @@ pub use backend::{
 };
 pub use brickfield_optics::QuadratureRule;
 pub use cells::{
-    CellFace, CellNode, Cells, CellsBackend, CellsError, CellsPlan, CellsPlanError, CellsView, FaceBox, Handedness,
+    CellFace, CellNode, Cells, CellsBackend, CellsError, CellsPlan, CellsPlanError, CellsShading, CellsView, FaceBox,
+    Handedness,
 };
 pub use content::{Chunk, Chunked, ContentId, HeldChunks};
 pub use feature::{Feature, FeatureSet};

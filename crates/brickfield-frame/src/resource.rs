@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use crate::mesh::color_knots;
-use crate::{Chunked, FramePlan, KnotUniform, LightUniform, MeshPlan, MeshUniforms, Slots};
+use crate::{CellsPlan, Chunked, FramePlan, FrameUniforms, KnotUniform, LightUniform, MeshPlan, MeshUniforms, Slots};
 
 /// A buffer, texture or sampler, by the name that it has in shaders (`frame.wesl`).
 ///
@@ -78,6 +78,16 @@ pub enum Resource {
     Triangles,
     /// The knots of a mesh's colour map.
     Colors,
+    /// The nodes of curvilinear cells ([`CellNode`](crate::CellNode)).
+    Nodes,
+    /// The faces between a cell and nothing ([`CellFace`](crate::CellFace)).
+    Faces,
+    /// The boxes around faces ([`FaceBox`](crate::FaceBox)).
+    Boxes,
+    /// A bit for each cell that is left out.
+    Voids,
+    /// For each pixel, the colour and the distance of the surface that its ray through cells ends at.
+    Ends,
 }
 
 /// The data that a plan brings for a resource.
@@ -92,7 +102,7 @@ pub enum Content<'a> {
 
 impl Resource {
     /// All resources.
-    pub const ALL: [Resource; 33] = [
+    pub const ALL: [Resource; 38] = [
         Resource::Frame,
         Resource::Atlas,
         Resource::AtlasSampler,
@@ -126,6 +136,11 @@ impl Resource {
         Resource::Vertices,
         Resource::Triangles,
         Resource::Colors,
+        Resource::Nodes,
+        Resource::Faces,
+        Resource::Boxes,
+        Resource::Voids,
+        Resource::Ends,
     ];
 
     /// The name in shaders and messages.
@@ -164,6 +179,11 @@ impl Resource {
             Resource::Vertices => "vertices",
             Resource::Triangles => "triangles",
             Resource::Colors => "colors",
+            Resource::Nodes => "nodes",
+            Resource::Faces => "faces",
+            Resource::Boxes => "boxes",
+            Resource::Voids => "voids",
+            Resource::Ends => "ends",
         }
     }
 
@@ -214,7 +234,12 @@ impl FramePlan {
             | Resource::MeshView
             | Resource::Vertices
             | Resource::Triangles
-            | Resource::Colors => None,
+            | Resource::Colors
+            | Resource::Nodes
+            | Resource::Faces
+            | Resource::Boxes
+            | Resource::Voids
+            | Resource::Ends => None,
         }
     }
 }
@@ -228,6 +253,29 @@ impl MeshPlan {
             Resource::Vertices => Some(Content::Chunks(self.mesh().vertex_table())),
             Resource::Triangles => Some(Content::Chunks(self.mesh().triangle_table())),
             Resource::Colors => bytes(bytemuck::cast_slice(&color_knots(self))),
+            _ => None,
+        }
+    }
+}
+
+impl CellsPlan {
+    /// The content of a resource; `None` if cells do not have it.
+    pub fn content(&self, resource: Resource) -> Option<Content<'_>> {
+        let bytes = |bytes: &[u8]| Some(Content::Bytes(Cow::Owned(bytes.to_vec())));
+        let cells = self.cells();
+        match resource {
+            Resource::Frame => bytes(bytemuck::bytes_of(&FrameUniforms::of_cells(self))),
+            Resource::Knots => {
+                bytes(bytemuck::cast_slice(&KnotUniform::of_transfer(self.transfer(), self.value_scale())))
+            }
+            Resource::Nodes => Some(Content::Chunks(cells.node_table())),
+            Resource::Faces => Some(Content::Chunks(cells.face_table())),
+            Resource::Boxes => Some(Content::Chunks(cells.box_table())),
+            Resource::Voids => Some(Content::Chunks(cells.void_table())),
+            Resource::Ends => {
+                let ends = self.behind()?;
+                Some(Content::Bytes(Cow::Borrowed(bytemuck::cast_slice(ends.pixels()))))
+            }
             _ => None,
         }
     }

@@ -3,10 +3,10 @@
 //! The layouts are held against naga's member offsets by a test of `brickfield-shaders`.
 
 use brickfield_core::glam::{DVec3, UVec3};
-use brickfield_core::{Knot, Place};
+use brickfield_core::{Knot, Place, TransferFunction};
 use bytemuck::{Pod, Zeroable};
 
-use crate::{AtlasShape, FramePlan, Pass};
+use crate::{AtlasShape, CellsPlan, FramePlan, Handedness, Pass, ValueScale};
 
 /// The frame's uniform block: vectors of three, each followed by an unrelated number. Positions are in
 /// sample space relative to `RayFrame::center`.
@@ -189,6 +189,45 @@ impl FrameUniforms {
         .in_pass(&whole)
     }
 
+    /// The uniform block of a picture of cells, as far as their shader reads it. Lengths are in [`CellsPlan::unit`]s: a position is one over
+    /// the unit from the cells' centre. The numbers of the index are those of cells; that of a voxel is the unit, and behind it 1, or -1 if the
+    /// cells are left-handed.
+    pub fn of_cells(plan: &CellsPlan) -> FrameUniforms {
+        let (rays, cells, unit) = (plan.rays(), plan.cells(), plan.unit());
+        let (step, values) = (plan.sampling().step_world(), plan.value_scale());
+        let is_parallel = rays.are_parallel();
+        // A whole number of steps before the nearest cell.
+        let nearest = (rays.eye().length() - cells.radius()).max(0.0);
+        let start = (nearest / step).floor() * step;
+        let handedness = match cells.handedness() {
+            Handedness::Right => 1.0,
+            Handedness::Left => -1.0,
+        };
+        let mut uniforms = FrameUniforms {
+            anchor: float3(rays.anchor[0] / unit),
+            anchor_past_start: ((rays.anchor_depth - start) / unit) as f32,
+            anchor_right: float3(rays.anchor[1] / unit),
+            pixel_side: if is_parallel { 0.0 } else { rays.pixel[0].length() as f32 },
+            anchor_down: float3(rays.anchor[2] / unit),
+            anchor_depth: if is_parallel { 0.0 } else { (rays.anchor_depth / unit) as f32 },
+            direction: float3(rays.direction[0]),
+            least_parameter: (-start / unit) as f32,
+            direction_right: float3(rays.direction[1]),
+            step_world: (step / unit) as f32,
+            direction_down: float3(rays.direction[2]),
+            transmittance_floor: plan.sampling().transmittance_floor() as f32,
+            sample_scale: values.unit().recip() as f32,
+            sample_offset: (-values.origin() / values.unit()) as f32,
+            index_dims: cells.n_cells().to_array(),
+            n_knots: plan.transfer().knots().len() as u32,
+            voxel_world: [unit as f32, handedness, 0.0],
+            size: rays.size.to_array(),
+            ..FrameUniforms::zeroed()
+        };
+        uniforms = uniforms.in_pass(&Pass::whole_rays(0..rays.size.y));
+        uniforms
+    }
+
     /// The uniform block for one pass.
     #[must_use]
     pub fn in_pass(mut self, pass: &Pass) -> FrameUniforms {
@@ -204,7 +243,12 @@ impl FrameUniforms {
 impl KnotUniform {
     /// The knots of a plan's transfer function.
     pub fn of(plan: &FramePlan) -> Vec<KnotUniform> {
-        let (knots, values) = (plan.transfer.knots(), plan.value_scale());
+        KnotUniform::of_transfer(&plan.transfer, plan.value_scale())
+    }
+
+    /// The knots of a transfer function, their values in a scale.
+    pub fn of_transfer(transfer: &TransferFunction, values: ValueScale) -> Vec<KnotUniform> {
+        let knots = transfer.knots();
         let reciprocal = |i: usize| match knots.get(i + 1) {
             Some(next) if next.value > knots[i].value => values.unit() / (next.value - knots[i].value),
             _ => 0.0,

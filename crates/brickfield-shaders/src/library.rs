@@ -27,7 +27,7 @@ const fn one_of(path: &'static str, name: &'static str, text: &'static str) -> M
     Module { name, path, text: Cow::Borrowed(text) }
 }
 
-const EMBEDDED: [Module; 28] = [
+const EMBEDDED: [Module; 29] = [
     own("frame", include_str!("wesl/frame.wesl")),
     own("scalar", include_str!("wesl/scalar.wesl")),
     own("transfer", include_str!("wesl/transfer.wesl")),
@@ -56,6 +56,7 @@ const EMBEDDED: [Module; 28] = [
     own("probe", include_str!("wesl/probe.wesl")),
     own("decode", include_str!("wesl/decode.wesl")),
     own("mesh", include_str!("wesl/mesh.wesl")),
+    own("cells", include_str!("wesl/cells.wesl")),
 ];
 
 /// The shader sources: modules of WESL text by name.

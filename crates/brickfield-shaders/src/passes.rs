@@ -1,6 +1,8 @@
 //! How a frame is cut into dispatches: none takes long, no loop goes round too often, no sum grows too long.
 
-use brickfield_frame::{Division, FramePlan, Join, Pass, QuadratureRule};
+use std::ops::Range;
+
+use brickfield_frame::{CellsPlan, Division, FramePlan, Join, Pass, QuadratureRule, RenderError};
 
 use crate::KnotSearch;
 
@@ -35,6 +37,31 @@ pub fn n_rays_that_go_on(plan: &FramePlan, group_height: u32) -> u64 {
     let rows = rows_per_pass(plan, group_height).min(plan.size().y);
     u64::from(if plan.is_batch() { plan.size().y } else { rows }) * u64::from(plan.size().x)
 }
+
+/// The bands of rows of a picture of cells, each a dispatch.
+///
+/// # Errors
+/// Rays that may pass so many cells and segments that an invocation's loops would end without a word.
+pub fn rows_of_cells(plan: &CellsPlan) -> Result<Vec<Range<u32>>, RenderError> {
+    let n_cells = f64::from(plan.cells().n_cells().element_sum());
+    let n_segments = 2.0 * plan.cells().radius() / plan.sampling().step_world();
+    // A cell goes round the walk once, and once more for its segments; the last segment walks again.
+    let rounds = ROUNDS_OF_FACES + 3.0 * n_cells + 2.0 * n_segments;
+    if rounds > MOST_ROUNDS {
+        return Err(RenderError::Unsupported { what: "walk rays of so many cells and segments in one dispatch" });
+    }
+    let height = plan.size().y;
+    let per_row = f64::from(plan.size().x) * (CELL_VALUES * n_cells + n_segments);
+    let n_rows = ((MOST_VALUES / per_row) as u32 / CELL_ROWS).max(1).saturating_mul(CELL_ROWS);
+    Ok((0..height).step_by(n_rows as usize).map(|first| first..height.min(first.saturating_add(n_rows))).collect())
+}
+
+/// Rows of a workgroup.
+const CELL_ROWS: u32 = 8;
+/// The work of a cell, in values of a field.
+const CELL_VALUES: f64 = 8.0;
+/// Rounds of the searches for faces where a ray enters.
+const ROUNDS_OF_FACES: f64 = 8192.0;
 
 /// Whether rays need several passes.
 pub(crate) fn has_long_rays(plan: &FramePlan) -> bool {

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
-use brickfield_frame::{FramePlan, MeshPlan, RenderError, ShaderChoice, Target};
+use brickfield_frame::{CellsPlan, FramePlan, MeshPlan, RenderError, ShaderChoice, Target};
 
 use crate::trial::Trial;
 use crate::{Entry, Variant};
@@ -75,6 +75,11 @@ impl PipelineKey {
     /// The pipeline that draws a mesh.
     pub fn mesh(plan: &MeshPlan) -> PipelineKey {
         PipelineKey::computing(Variant::mesh(plan.shading()))
+    }
+
+    /// The pipeline that draws cells.
+    pub fn cells(plan: &CellsPlan) -> PipelineKey {
+        PipelineKey::computing(Variant::cells(plan))
     }
 
     /// The pipeline that unpacks the slots of a plan, if any are packed.

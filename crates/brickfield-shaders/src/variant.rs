@@ -2,8 +2,8 @@
 
 use brickfield_core::Interblock;
 use brickfield_frame::{
-    Coloring, Division, Feature, FeatureSet, Fetch, FramePlan, Join, Lengths, MeshShading, Placement, Places,
-    QuadratureRule, ShaderFunction, Slices,
+    CellsPlan, CellsShading, Coloring, Division, Feature, FeatureSet, Fetch, FramePlan, Join, Lengths, MeshShading,
+    Placement, Places, QuadratureRule, ShaderFunction, Slices,
 };
 
 use crate::passes::has_long_rays;
@@ -213,6 +213,8 @@ pub enum Entry {
     Decode,
     /// Renders the picture of a mesh ([`brickfield_frame::MeshPlan`]): a vertex and a fragment shader.
     Mesh(MeshShading),
+    /// Renders the picture of curvilinear cells ([`brickfield_frame::CellsPlan`]) by walking from cell to cell.
+    Cells(CellsShading),
 }
 
 impl Entry {
@@ -225,6 +227,7 @@ impl Entry {
             .chain(Fetch::ALL.map(Entry::Probe))
             .chain([Entry::Decode])
             .chain(MeshShading::all().map(Entry::Mesh))
+            .chain(CellsShading::all().map(Entry::Cells))
     }
 
     /// The names of the entry points: one for compute, or one for vertices and one for fragments.
@@ -237,6 +240,7 @@ impl Entry {
             Entry::Probe(Fetch::Loaded) => &["loaded"],
             Entry::Decode => &["decode"],
             Entry::Mesh(_) => &["place", "paint"],
+            Entry::Cells(_) => &["march_cells"],
         }
     }
 
@@ -249,6 +253,7 @@ impl Entry {
             Entry::Probe(_) => "probe",
             Entry::Decode => "decode",
             Entry::Mesh(_) => "mesh",
+            Entry::Cells(_) => "cells",
         }
     }
 }
@@ -304,7 +309,7 @@ impl Variant {
         };
         match self.entry {
             Entry::March | Entry::Proxy(_) => Variant { features, search, ..self },
-            Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode | Entry::Mesh(_) => self,
+            Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode | Entry::Mesh(_) | Entry::Cells(_) => self,
         }
     }
 
@@ -330,7 +335,8 @@ impl Variant {
     fn is_prefiltered(self) -> bool {
         let is_classified =
             self.features.contains(Feature::TransferLookup) && self.rule != QuadratureRule::PreIntegrated;
-        self.features.contains(Feature::Prefiltered) && matches!(self.field, FieldKind::Blocks(_)) && is_classified
+        let has_blocks = matches!(self.field, FieldKind::Blocks(_)) && !matches!(self.entry, Entry::Cells(_));
+        self.features.contains(Feature::Prefiltered) && has_blocks && is_classified
     }
 
     /// The shader that reads textures one way. It has nothing of a plan's.
@@ -348,6 +354,18 @@ impl Variant {
         Variant::new(FeatureSet::default(), QuadratureRule::MidpointExponential, Entry::Mesh(shading))
     }
 
+    /// The shader that draws a picture of cells.
+    pub fn cells(plan: &CellsPlan) -> Variant {
+        let n_knots = plan.transfer().knots().len();
+        let needed = [
+            (Feature::TransferLookup, n_knots > 1),
+            (Feature::EarlyTermination, plan.sampling().transmittance_floor() > 0.0),
+        ];
+        let features = needed.into_iter().filter_map(|(feature, is_needed)| is_needed.then_some(feature)).collect();
+        let variant = Variant::new(features, plan.sampling().rule(), Entry::Cells(plan.shading()));
+        Variant { search: KnotSearch::among(n_knots), ..variant }
+    }
+
     /// The conditions (`@if(name)`) that hold.
     pub(crate) fn conditions(self) -> Vec<(String, bool)> {
         let has = |f| self.features.contains(f);
@@ -361,9 +379,10 @@ impl Variant {
         let evaluated = |f| self.entry == Entry::Evaluate(f);
         let functions = ShaderFunction::ALL.into_iter().map(|f| (format!("evaluate_{}", f.name()), evaluated(f)));
         let two_nodes = self.rule.nodes().len() > 1;
-        let shading = match self.entry {
-            Entry::Mesh(shading) => shading,
-            _ => MeshShading::default(),
+        let (shading, cells) = match self.entry {
+            Entry::Mesh(shading) => (shading, CellsShading::default()),
+            Entry::Cells(cells) => (MeshShading::default(), cells),
+            _ => Default::default(),
         };
         let derived = [
             ("one_node", !two_nodes),
@@ -382,6 +401,8 @@ impl Variant {
             ("mesh_light", shading.lit),
             ("mesh_normals", shading.has_normals),
             ("mesh_lines", shading.has_lines),
+            ("cell_voids", cells.has_voids),
+            ("cell_ends", cells.has_ends),
         ];
         let derived = derived.into_iter().map(|(name, holds)| (name.to_owned(), holds));
         let scheme = |s: Interblock| (s.name().replace('-', "_"), self.field.scheme() == Some(s));

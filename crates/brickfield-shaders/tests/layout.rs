@@ -3,8 +3,8 @@
 use std::mem::{offset_of, size_of};
 
 use brickfield_frame::{
-    DecodingUniforms, Feature, FeatureSet, Fetch, FrameUniforms, KnotUniform, LightUniform, MeshShading, MeshUniforms,
-    MeshVertex, PackedUniform, PlaceUniform, ProbeUniforms, QuadratureRule,
+    CellsShading, DecodingUniforms, FaceBox, Feature, FeatureSet, Fetch, FrameUniforms, KnotUniform, LightUniform,
+    MeshShading, MeshUniforms, MeshVertex, PackedUniform, PlaceUniform, ProbeUniforms, QuadratureRule,
 };
 use brickfield_shaders::naga::{Module, TypeInner};
 use brickfield_shaders::{Entry, FieldKind, Variant, specialise};
@@ -57,6 +57,10 @@ fn host_and_shader_structs_have_the_same_layout() {
     assert_equal(&mesh, "MeshView", host!(MeshUniforms, clip_x, clip_y, clip_z, clip_w, anchor, anchor_right, anchor_down, direction,
         direction_right, direction_down, line, source, n_knots, shininess, padding));
     assert_equal(&mesh, "Vertex", host!(MeshVertex, position, normal));
+    let midpoint = QuadratureRule::MidpointExponential;
+    let cells = Variant::new(FeatureSet::default(), midpoint, Entry::Cells(CellsShading::default()));
+    let cells = specialise(&cells).unwrap().module;
+    assert_equal(&cells, "FaceBox", host!(FaceBox, low = min, first, high = max, n_faces));
     for fetch in Fetch::ALL {
         assert_equal(&specialise(&Variant::probe(fetch)).unwrap().module, "Probe", host!(ProbeUniforms, work));
     }

@@ -142,6 +142,11 @@ fn every_pair_of_options_compiles_and_binds_what_it_names() {
                 let expected = [Resource::MeshView, Resource::Vertices, Resource::Triangles, Resource::Colors];
                 assert_eq!(resources(&shader), expected);
             }
+            Entry::Cells(shading) => {
+                assert_eq!(shader.workgroup_size, [8, 8, 1]);
+                assert!([Resource::Nodes, Resource::Faces, Resource::Boxes].into_iter().all(uses));
+                assert_eq!((uses(Resource::Voids), uses(Resource::Ends)), (shading.has_voids, shading.has_ends));
+            }
             Entry::Evaluate(_) => {
                 let outputs = |b: &&brickfield_shaders::Binding| b.resource == Resource::Outputs;
                 let outputs = shader.bindings.iter().find(outputs).unwrap();

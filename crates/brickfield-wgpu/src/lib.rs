@@ -3,6 +3,7 @@
 mod adapter;
 mod backend;
 mod buffer;
+mod cells;
 mod clock;
 mod decode;
 mod device;

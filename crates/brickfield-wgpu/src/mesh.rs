@@ -21,7 +21,7 @@ impl MeshBackend for WgpuBackend {
         let started = Instant::now();
         let key = PipelineKey::mesh(plan);
         self.pipelines.of(key)?;
-        let uploaded_bytes = self.resources.bring_mesh(&self.device, plan, &self.pipelines[key])?;
+        let uploaded_bytes = self.resources.bring_contents(&self.device, &|r| plan.content(r), &self.pipelines[key])?;
         self.resources.resize(&self.device, plan.size(), Maker::Mesh)?;
         self.device.queue.submit([]);
         self.device.wait("uploading")?;

@@ -62,7 +62,7 @@ fn from_shader(device: &wgpu::Device, shader: Specialised, target: Target) -> Pi
     let program = match entry {
         Entry::Proxy(_) => Program::Polygons(polygons(device, &pipeline_layout, &module, (entry, target))),
         Entry::Mesh(_) => Program::Mesh(mesh(device, &pipeline_layout, &module, entry)),
-        Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => {
+        Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode | Entry::Cells(_) => {
             Program::Compute(compute(device, &pipeline_layout, &module, label))
         }
     };
@@ -183,7 +183,9 @@ fn layout_entry(binding: &Binding, entry: Entry, filtered: bool) -> wgpu::BindGr
     };
     let visibility = match entry {
         Entry::Proxy(_) | Entry::Mesh(_) => wgpu::ShaderStages::VERTEX_FRAGMENT,
-        Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => wgpu::ShaderStages::COMPUTE,
+        Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode | Entry::Cells(_) => {
+            wgpu::ShaderStages::COMPUTE
+        }
     };
     wgpu::BindGroupLayoutEntry { binding: binding.index, visibility, ty, count: None }
 }

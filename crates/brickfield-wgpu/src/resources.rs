@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use brickfield_core::BrickSide;
 use brickfield_core::glam::UVec2;
-use brickfield_frame::{AtlasShape, Content, FramePlan, FrameUniforms, MeshPlan, RenderError, Resource, Slots};
+use brickfield_frame::{AtlasShape, Content, FramePlan, FrameUniforms, RenderError, Resource, Slots};
 use brickfield_shaders::{Binding, BindingKind, decodings};
 use wgpu::BufferUsages;
 
@@ -80,18 +80,19 @@ impl Resources {
         Ok(Brought { uniforms, n_bytes })
     }
 
-    /// As [`bring`](Self::bring), of a mesh; the bytes that were brought.
-    pub(crate) fn bring_mesh(
+    /// Brings the numbers and lists of another plan, as `contents` has them, that `pipeline` reads; the bytes that were brought.
+    pub(crate) fn bring_contents<'a>(
         &mut self,
         device: &Device,
-        plan: &MeshPlan,
+        contents: &dyn Fn(Resource) -> Option<Content<'a>>,
         pipeline: &Pipeline,
     ) -> Result<u64, RenderError> {
         let mut n_bytes = 0;
         for Binding { resource, .. } in &pipeline.bindings {
-            n_bytes += match plan.content(*resource) {
+            n_bytes += match contents(*resource) {
                 Some(Content::Bytes(bytes)) => self.buffer(*resource).write(device, &bytes)?,
                 Some(Content::Chunks(chunks)) => self.buffer(*resource).bring(device, chunks)?,
+                None if *resource == Resource::Picture => 0,
                 Some(Content::Texture(_)) | None => return Err(missing(*resource)),
             };
         }

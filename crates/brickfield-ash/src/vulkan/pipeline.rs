@@ -129,7 +129,9 @@ impl Pipeline {
     fn lay_out(&mut self) -> Result<(), RenderError> {
         let stages = match self.entry {
             Entry::Proxy(_) | Entry::Mesh(_) => vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT,
-            Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => vk::ShaderStageFlags::COMPUTE,
+            Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode | Entry::Cells(_) => {
+                vk::ShaderStageFlags::COMPUTE
+            }
         };
         let binding = |b: &Binding| {
             vk::DescriptorSetLayoutBinding::default()
@@ -174,7 +176,9 @@ impl Pipeline {
         let made = match self.entry {
             Entry::Proxy(_) => self.compile_triangles(module, CanvasKind::Polygons(target)),
             Entry::Mesh(_) => self.compile_triangles(module, CanvasKind::Mesh),
-            Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode => self.compile_compute(module),
+            Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode | Entry::Cells(_) => {
+                self.compile_compute(module)
+            }
         };
         // SAFETY: a pipeline does not need its module any more.
         unsafe { device.raw().destroy_shader_module(module, None) };

@@ -2,7 +2,7 @@
 
 use brickfield_core::ValueRange;
 use brickfield_core::glam::Vec4;
-use brickfield_frame::{CellsPlan, Decode, Handedness, ValueScale};
+use brickfield_frame::{CellsPlan, Handedness};
 use rayon::prelude::*;
 
 use crate::fast::classify::Classifier;
@@ -39,8 +39,7 @@ pub(super) struct Cell {
 impl<'a> Scene<'a> {
     pub(super) fn new(plan: &'a CellsPlan) -> Scene<'a> {
         let cells = plan.cells();
-        let unit = 2f64.powi(cells.radius().log2().ceil() as i32);
-        let scale = value_scale(plan);
+        let (unit, scale) = (plan.unit(), plan.value_scale());
         let node = |n: &brickfield_frame::CellNode| {
             let [x, y, z] = n.position.map(|x| (f64::from(x) / unit) as f32);
             Vec4::new(x, y, z, scale.number(f64::from(n.value)) as f32)
@@ -115,10 +114,4 @@ impl<'a> Scene<'a> {
         let [min, max] = [f64::min, f64::max].map(|f| values.into_iter().reduce(f).unwrap_or(0.0));
         ValueRange { min, max }
     }
-}
-
-fn value_scale(plan: &CellsPlan) -> ValueScale {
-    let values = || plan.cells().nodes().iter().map(|n| f64::from(n.value));
-    let (min, max) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-    ValueScale::of(plan.transfer(), Decode { scale: max - min, offset: min })
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use brickfield_core::glam::UVec2;
 use brickfield_core::{Camera, Image, TransferFunction};
 
-use crate::{Division, Frame, Lengths, RenderError, Sampling, ViewRays};
+use crate::{Decode, Division, Frame, Lengths, RenderError, Sampling, ValueScale, ViewRays};
 
 pub use boundary::{CellFace, FaceBox};
 pub use data::{CellNode, Cells, CellsError, Handedness};
@@ -125,9 +125,44 @@ impl CellsPlan {
         (t > 0.0).then_some(([r, g, b], t))
     }
 
+    /// How f32 arithmetic counts data values.
+    pub fn value_scale(&self) -> ValueScale {
+        let values = || self.cells.nodes().iter().map(|node| f64::from(node.value));
+        let (min, max) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+        ValueScale::of(&self.transfer, Decode { scale: max - min, offset: min })
+    }
+
+    /// A power of two near the cells' radius, in world units: with lengths in this unit, products of them stay within f32.
+    pub fn unit(&self) -> f64 {
+        2f64.powi(self.cells.radius().log2().ceil() as i32)
+    }
+
+    /// The choices that are compiled into its shader.
+    pub fn shading(&self) -> CellsShading {
+        CellsShading { has_voids: !self.cells.voids().is_empty(), has_ends: self.behind.is_some() }
+    }
+
     /// Width and height of the picture, in pixels.
     pub fn size(&self) -> UVec2 {
         self.rays.size
+    }
+}
+
+/// What a shader of cells has to do; the rest is left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct CellsShading {
+    /// Some cells are left out.
+    pub has_voids: bool,
+    /// Rays end at a surface.
+    pub has_ends: bool,
+}
+
+impl CellsShading {
+    /// All that shaders tell apart.
+    pub fn all() -> impl Iterator<Item = CellsShading> {
+        [false, true]
+            .into_iter()
+            .flat_map(|has_voids| [false, true].map(|has_ends| CellsShading { has_voids, has_ends }))
     }
 }
 
