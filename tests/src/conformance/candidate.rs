@@ -1,6 +1,8 @@
 //! The backends that are held to account, and their mutants.
 
-use brickfield::frame::{Backend, Capabilities, FramePlan, MeshFrame, MeshPlan, RenderError, ShaderFunction};
+use brickfield::frame::{
+    Backend, Capabilities, CellsPlan, FramePlan, MeshFrame, MeshPlan, RenderError, ShaderFunction,
+};
 use brickfield::{BackendKind, BackendStatus, Validation, backends, open_backend};
 use brickfield_core::Image;
 use brickfield_shaders::ShaderLibrary;
@@ -69,6 +71,11 @@ impl Candidate {
         self.opened.as_mut().ok().map(|b| b.render_mesh(plan))
     }
 
+    /// Draws curvilinear cells; `None` if the backend is absent.
+    pub fn render_cells(&mut self, plan: &CellsPlan) -> Option<Result<Image<f32>, RenderError>> {
+        self.opened.as_mut().ok().map(|b| b.render_cells(plan).map(|frame| frame.image))
+    }
+
     /// Evaluates a function; `None` if the backend is absent.
     pub fn evaluate(
         &mut self,
@@ -98,8 +105,7 @@ impl Candidate {
     pub fn can_run(&self, mutant: &Mutant) -> bool {
         let needs_shaders = match mutant {
             Mutant::Plan(plan) => plan.is_of_polygons(),
-            // The cpu draws meshes by the reference itself: it would notice mutants, but not whether others do.
-            Mutant::Mesh(_) => true,
+            Mutant::Mesh(_) | Mutant::Cells(_) => false,
             Mutant::Shader(_) => true,
         };
         self.opened.is_ok() && (self.has_shaders() || !needs_shaders)

@@ -11,6 +11,7 @@ use brickfield::{
 };
 use brickfield_core::{Level, Volume};
 
+use super::cells::{CellsMutant, CellsTest};
 use super::mesh_mutants::MeshMutant;
 use super::meshes::MeshTest;
 use super::plan_mutants::PlanMutant;
@@ -33,6 +34,8 @@ pub enum Check {
     Picture(Box<dyn Fn() -> Result<PictureTest, NoData> + Send + Sync>),
     /// Draws a mesh.
     Mesh(Box<dyn Fn() -> MeshTest + Send + Sync>),
+    /// Draws curvilinear cells.
+    Cells(Box<dyn Fn() -> CellsTest + Send + Sync>),
     /// Evaluates one function on a list of inputs.
     Function(Box<dyn Fn() -> FunctionTest + Send + Sync>),
 }
@@ -44,6 +47,8 @@ pub enum Mutant {
     Plan(PlanMutant),
     /// In the plan of a mesh that it is handed.
     Mesh(MeshMutant),
+    /// In the plan of cells that it is handed.
+    Cells(CellsMutant),
     /// In the shaders that it compiles.
     Shader(ShaderMutant),
 }
@@ -197,6 +202,7 @@ impl Mutant {
         match self {
             Mutant::Plan(m) => m.name(),
             Mutant::Mesh(m) => m.name(),
+            Mutant::Cells(m) => m.name(),
             Mutant::Shader(m) => m.name,
         }
     }
@@ -205,7 +211,8 @@ impl Mutant {
     pub fn all() -> BTreeSet<Mutant> {
         let shaders = super::shader_mutants::ALL.iter().copied().map(Mutant::Shader);
         let meshes = MeshMutant::ALL.into_iter().map(Mutant::Mesh);
-        PlanMutant::ALL.into_iter().map(Mutant::Plan).chain(meshes).chain(shaders).collect()
+        let cells = CellsMutant::ALL.into_iter().map(Mutant::Cells);
+        PlanMutant::ALL.into_iter().map(Mutant::Plan).chain(meshes).chain(cells).chain(shaders).collect()
     }
 }
 
@@ -224,6 +231,12 @@ impl From<PlanMutant> for Mutant {
 impl From<MeshMutant> for Mutant {
     fn from(m: MeshMutant) -> Mutant {
         Mutant::Mesh(m)
+    }
+}
+
+impl From<CellsMutant> for Mutant {
+    fn from(m: CellsMutant) -> Mutant {
+        Mutant::Cells(m)
     }
 }
 

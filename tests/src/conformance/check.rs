@@ -11,6 +11,7 @@ use brickfield_core::glam::UVec2;
 
 use super::candidate::Candidate;
 use super::case::{Case, Check, FunctionTest, Mutant, NoData, Oracle, PictureTest, Plans, Shows};
+use super::cells::PreparedCells;
 use super::meshes::PreparedMesh;
 use super::naive::naive;
 use super::record::RecordEntry;
@@ -24,6 +25,7 @@ pub struct Prepared {
 enum CheckTask {
     Picture(Box<PreparedPicture>),
     Mesh(Box<PreparedMesh>),
+    Cells(Box<PreparedCells>),
     Function(Box<FunctionTest>),
 }
 
@@ -90,6 +92,7 @@ impl Prepared {
     pub fn of(case: &Case) -> Result<Prepared, Obstacle> {
         let work = match &case.check {
             Check::Function(test) => CheckTask::Function(Box::new(test())),
+            Check::Cells(test) => CheckTask::Cells(Box::new(PreparedCells::of(test())?)),
             Check::Mesh(test) => CheckTask::Mesh(Box::new(PreparedMesh::of(test())?)),
             Check::Picture(subject) => {
                 let subject = subject()?;
@@ -110,6 +113,7 @@ impl Prepared {
         match &self.work {
             CheckTask::Picture(picture) => Some(&picture.reference.image),
             CheckTask::Mesh(mesh) => Some(&mesh.answer.pixels),
+            CheckTask::Cells(cells) => Some(&cells.reference.image),
             CheckTask::Function(_) => None,
         }
     }
@@ -121,6 +125,7 @@ impl Prepared {
         let run = AssertUnwindSafe(|| match &mut self.work {
             CheckTask::Function(test) => run_function(test, on, mutant),
             CheckTask::Mesh(mesh) => mesh.run(on, mutant),
+            CheckTask::Cells(cells) => cells.run(on, mutant),
             CheckTask::Picture(picture) => run_picture(picture, &capabilities, on, mutant),
         });
         // A backend that panics fails its case, not the run.
@@ -136,6 +141,7 @@ impl Prepared {
                 format!("{} x {} pixels, {n} bricks, {}, {}", size.x, size.y, scene.rule.name(), scene.mode.name())
             }
             CheckTask::Mesh(mesh) => mesh.describe(),
+            CheckTask::Cells(cells) => cells.describe(),
             CheckTask::Function(test) => format!("{} inputs", test.points.len()),
         }
     }

@@ -13,7 +13,8 @@
 //! behind and of the sum, each of at most the target's unit roundoff: 2^-24, or 2^-11 for 16-bit floats, in which a device may blend.
 //! What is blended is at most 1, and what comes before only dims it: so both bounds are wider by three of them a segment.
 //!
-//! **Meshes**: the same bounds, wider by the ambiguity of the pixel: where corners and depths are rounded, another triangle may be drawn.
+//! **Meshes** and **cells**: the same bounds, wider by the ambiguity of the pixel: where corners and depths are rounded, another triangle
+//! may be drawn; where a ray grazes a face or an edge, it may pass another cell.
 //!
 //! A tolerance so wide that the picture could be anything is no test: see [`Tolerance::is_empty_promise`].
 
@@ -29,7 +30,7 @@ use crate::metrics::{Errors, MetricError, errors, quantile};
 const BULK: f64 = 0.999;
 /// The narrow bound of exact mode.
 const BULK_BOUND: f64 = 1e-5;
-/// The wide bound of meshes.
+/// The wide bound of meshes and cells.
 const MESH_BOUND: f64 = 1e-4;
 /// The widest bound that is a test: three quarters of a fast picture's pixels have a bound that is no wider.
 const EMPTY_PROMISE: f64 = 0.2;
@@ -131,7 +132,7 @@ impl Tolerance {
         Ok(PlanTolerance::of(plan, reference)?.on(plan, reference, device.sub_texel_bits))
     }
 
-    /// The rule for a mesh, given how far each pixel may be off.
+    /// The rule for a mesh or cells, given how far each pixel may be off.
     pub(super) fn of_ambiguity(ambiguity: &[f64]) -> Tolerance {
         let of = |bound: f64| ambiguity.iter().map(move |a| bound + a).collect();
         Tolerance { most: of(MESH_BOUND), bulk: of(BULK_BOUND) }

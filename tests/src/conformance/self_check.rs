@@ -75,10 +75,12 @@ impl SelfCheck {
 
     fn fate(&mut self, prepared: &mut Prepared, mutant: &Mutant, candidates: &mut [Candidate]) -> Fate {
         let judged = match mutant {
-            Mutant::Plan(_) | Mutant::Mesh(_) => match candidates.iter_mut().find(|c| c.can_run(mutant)) {
-                Some(candidate) => prepared.run(candidate, Some(mutant)),
-                None => return Fate::NotRun("no backend".into()),
-            },
+            Mutant::Plan(_) | Mutant::Mesh(_) | Mutant::Cells(_) => {
+                match candidates.iter_mut().find(|c| c.can_run(mutant)) {
+                    Some(candidate) => prepared.run(candidate, Some(mutant)),
+                    None => return Fate::NotRun("no backend".into()),
+                }
+            }
             Mutant::Shader(_) => match self.patched(mutant, candidates) {
                 Some(Ok(candidate)) => prepared.run(candidate, Some(mutant)),
                 Some(Err(e)) => return Fate::Survived(e.clone()),

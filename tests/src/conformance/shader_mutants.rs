@@ -300,6 +300,22 @@ mutants! {
         => "select(1e9, pixels_from(ray, c, a), (edges & 2u) != 0u)";
     /// The anchors of neighbouring pixels are taken for one.
     MESH_LINE_SLOPE: "mesh-line-slope", "mesh", "pixels_from", "+ triple(ray, mesh_view.anchor_right.xyz, along)" => "";
+    /// The value of a cell's first corner.
+    CELLS_NEAREST: "cells-nearest", "cells", "value_at", "return here.w + dot(vec3f(du.w, dv.w, dw.w), change);" => "return corner[0].w;";
+    /// The guess of the place in a cell is its place.
+    CELLS_GUESS: "cells-guess", "cells", "value_at", "local += change;" => "local += change * 0.0;";
+    /// Rows of cells end with their last whole segment.
+    CELLS_LAST_DROPPED: "cells-last-dropped", "cells", "row_of_cells", "if begun < to" => "if false";
+    /// The next cell is entered through the other half of the face.
+    CELLS_WRONG_FACE: "cells-wrong-face", "cells", "leave", "exit.triangle ^ 2u" => "exit.triangle ^ 3u";
+    /// Left-handed cells are taken for right-handed ones.
+    CELLS_HANDEDNESS: "cells-handedness", "cells", "handedness", "frame.voxel_world.y" => "1.0";
+    /// Cells that are left out are walked through.
+    CELLS_VOIDS: "cells-voids", "cells", "is_void", "((voids[number >> 5u] >> (number & 31u)) & 1u) == 1u" => "voids[0] == 12345u";
+    /// Rays do not end at surfaces.
+    CELLS_SURFACE: "cells-surface", "cells", "march_cells", "end = ray.eye + surface.w / unit_world();" => "end = FAR;";
+    /// Cells behind the eye are seen.
+    CELLS_EYE: "cells-eye", "cells", "through_cells", "var reached = ray.eye;" => "var reached = -FAR;";
     /// Opacity is the depth.
     OPACITY_IS_DEPTH: "opacity-is-depth", "march", "march", "vec4f(seen.rgb, alpha(seen.w))" => "vec4f(seen.rgb, min(seen.w, 1.0))";
 }

@@ -1,6 +1,7 @@
 //! The cases.
 
 mod blocks;
+mod cells;
 mod extremes;
 mod fast;
 mod fields;
@@ -37,6 +38,7 @@ pub fn all() -> Vec<Case> {
         prefiltered::cases(),
         trimmed::cases(),
         meshes::cases(),
+        cells::cases(),
         extremes::cases(),
         real::cases(),
     ]
