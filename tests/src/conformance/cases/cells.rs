@@ -23,6 +23,8 @@ enum Shape {
     Polar,
     /// Faces are bent, no two edges are parallel.
     Bent,
+    /// Few cells, turned against each other so that a line may enter one several times.
+    Twisted,
 }
 
 /// What differs between cases.
@@ -92,6 +94,10 @@ impl CellsSetup {
                 let wave = DVec3::new((7.0 * p.y + p.z).sin(), (6.0 * p.z + 2.0 * p.x).sin(), (5.0 * p.x - p.y).cos());
                 1.5 * q + 0.06 * wave
             }
+            Shape::Twisted => {
+                let (sin, cos) = (2.4 * p.z).sin_cos();
+                DVec3::new(1.6 * (q.x * cos - q.y * sin), 1.6 * (q.x * sin + q.y * cos), 1.3 * q.z)
+            }
         }
     }
 
@@ -142,7 +148,9 @@ pub(super) fn cases() -> Vec<Case> {
                 shader::CELLS_LAST_DROPPED
             ],
         ),
-        of(Shape::Polar).case("polar", catches![StepScaled, shader::CELLS_WRONG_FACE]),
+        of(Shape::Polar).case("polar", catches![StepScaled]),
+        CellsSetup { n_cells: UVec3::new(3, 3, 2), eye: DVec3::new(2.6, -2.9, 0.4), ..of(Shape::Twisted) }
+            .case("twisted", catches![NodeMoved, shader::CELLS_WRONG_FACE]),
         of(Shape::Bent).case("bent", catches![NodeMoved, shader::CELLS_GUESS]),
         CellsSetup { stretch: -1.0, ..of(Shape::Bent) }
             .case("mirrored", catches![ValuesShifted, shader::CELLS_HANDEDNESS]),
