@@ -54,6 +54,6 @@ pub use residency::{Copied, Residency};
 pub use scene::{Quality, Scene, Skipping, Technique};
 #[cfg(feature = "formats")]
 pub use store::{StoreBlocks, StoreLimits, SummaryProgress};
-pub use surface::{SurfaceError, SurfaceNormals, mesh_of, spectrum, surface_mesh};
+pub use surface::{SurfaceError, SurfaceNormals, joined_mesh, mesh_of, spectrum, surface_mesh};
 pub use trimmed::{PrepareTrimmedError, TrimResidency, TrimmedVolume, Trimming, prepare_trimmed};
 pub use viewpoint::{Viewpoint, ViewpointError};

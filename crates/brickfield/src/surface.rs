@@ -7,8 +7,8 @@
 //! ```
 
 use brickfield_core::glam::DVec3;
-use brickfield_core::{Knot, TransferError, TransferFunction, ValueRange};
-use brickfield_curvilinear::{CurvilinearGrid, Node, OtherGrid, Selection, SurrogateMesh, surrogate_mesh};
+use brickfield_core::{Knot, Level, TransferError, TransferFunction, ValueRange};
+use brickfield_curvilinear::{CurvilinearGrid, Node, OtherGrid, QuadTree, Selection, SurrogateMesh, surrogate_mesh};
 use brickfield_frame::{Mesh, MeshError, MeshTriangle};
 use rayon::prelude::*;
 
@@ -74,6 +74,33 @@ pub fn mesh_of(grid: &CurvilinearGrid, surrogate: &SurrogateMesh, normals: Surfa
     Mesh::new(&surrogate.positions, &surrogate.values, normals.as_deref(), triangles)
 }
 
+/// The mesh of all final zones of several grids: planes of one volume, say.
+///
+/// # Errors
+/// More triangles than a mesh may have.
+pub fn joined_mesh(grids: &[CurvilinearGrid], normals: SurfaceNormals) -> Result<Mesh, SurfaceError> {
+    let (mut positions, mut values, mut of_nodes) = (Vec::new(), Vec::new(), Vec::new());
+    let mut triangles: Vec<MeshTriangle> = Vec::new();
+    for grid in grids {
+        let tree = QuadTree::build(grid.clone());
+        let finest = 0..tree.layout().n_zones(Level(0));
+        let zones = finest.map(|i| tree.layout().zone_at(Level(0), i)).filter(|zone| tree.summary(*zone).is_nice());
+        let selection = Selection::of_leaves(&tree, zones).expect("final zones without holes");
+        let surrogate = surrogate_mesh(grid, &selection)?;
+        let first = positions.len() as u32;
+        let moved = |corners: &[u32; 3]| MeshTriangle {
+            corners: corners.map(|corner| corner + first),
+            edges: outline(&surrogate, *corners),
+        };
+        triangles.extend(surrogate.triangles.iter().map(moved));
+        of_nodes.extend(surrogate.nodes.iter().map(|node| normal(grid, *node)));
+        positions.extend_from_slice(&surrogate.positions);
+        values.extend_from_slice(&surrogate.values);
+    }
+    let normals = (normals == SurfaceNormals::Grid).then_some(of_nodes.as_slice());
+    Ok(Mesh::new(&positions, &values, normals, triangles)?)
+}
+
 /// The edges of a triangle that are parts of its zone's outline: only those stay within a row or a column of nodes.
 fn outline(surrogate: &SurrogateMesh, corners: [u32; 3]) -> u32 {
     let node = |i: usize| surrogate.nodes[corners[i % 3] as usize];
@@ -99,8 +126,7 @@ fn normal(grid: &CurvilinearGrid, node: Node) -> DVec3 {
 mod tests {
     use std::sync::Arc;
 
-    use brickfield_core::Level;
-    use brickfield_curvilinear::{HeightField, Positions, QuadTree, Zone};
+    use brickfield_curvilinear::{HeightField, Positions, Zone};
 
     use super::*;
 

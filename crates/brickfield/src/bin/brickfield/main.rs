@@ -1,9 +1,11 @@
 //! The `brickfield` command: look at a volume file, render it, save it in another format, list the backends.
 
 mod backend;
+mod cells;
 mod convert;
 #[cfg(feature = "fetch")]
 mod fetched;
+mod grid_input;
 mod info;
 #[cfg(feature = "formats")]
 mod pack;
@@ -22,7 +24,8 @@ use brickfield::Codec;
 use brickfield::core::Aabb;
 use brickfield::core::glam::UVec2;
 use brickfield::curvilinear::GridPlane;
-use brickfield::io::{Limits, SAVED_EXTENSIONS};
+use brickfield::frame::{Mode, QuadratureRule};
+use brickfield::io::SAVED_EXTENSIONS;
 use brickfield::options::{
     Background, BlockArgs, Boxes, InputOptions, LightOptions, LightSourceOptions, OptionError, SamplingOptions,
     TreeOptions, ViewOptions, values,
@@ -33,6 +36,7 @@ use brickfield::{AdapterInfo, BackendError, BackendStatus, SurfaceNormals, Trimm
 use backend::BackendOptions;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
+use grid_input::GridInput;
 
 /// Renders scalar volumes by multiresolution bricks, on the CPU, through wgpu and through raw Vulkan.
 ///
@@ -53,7 +57,8 @@ use clap::{Args, Parser, Subcommand};
   brickfield render head.nrrd -o bricks.png --lod error=2 --show-bricks
   brickfield render head.nrrd -o planes.exr --polygons rgba16float --placement object-planes
   brickfield surface N00E010.hgt -o terrain.png --zones 20000 --light 1,-1,2 --color-bar
-  brickfield surface combxyz.bin --solution combq.bin -o slice.png --plane k=12 --lines 1"
+  brickfield surface combxyz.bin --solution combq.bin -o slice.png --plane k=12 --lines 1
+  brickfield cells combxyz.bin --solution combq.bin -o comb.png --plane k=12"
 )]
 struct Cli {
     #[command(subcommand)]
@@ -71,6 +76,8 @@ enum Command {
     Render(Box<RenderArgs>),
     /// Draws a surface of a structured grid, coloured by its values: terrain (HGT, USGS DEM, GeoTIFF), or a plane of a PLOT3D or VTK grid
     Surface(Box<SurfaceArgs>),
+    /// Renders the cells of a curvilinear grid as a volume (PLOT3D, VTK), with planes of the grid amid them if asked for
+    Cells(Box<CellsArgs>),
     /// Saves a volume in another format: values, spacing and direction survive; what the format cannot state is noted
     Convert(ConvertArgs),
     /// Packs a volume of any size as OME-Zarr 0.5 with all coarser levels, in bounded memory
@@ -205,27 +212,55 @@ fn show_bricks_help() -> String {
 }
 
 #[derive(Args)]
-struct SurfaceArgs {
-    /// File of structured grids: PLOT3D, HGT, USGS DEM, GeoTIFF, VTK (.vtr, .vts, .vtk)
-    file: PathBuf,
+struct CellsArgs {
+    #[command(flatten)]
+    input: GridInput,
     /// Picture to write: .exr (linear, for measuring) or .png (sRGB, for looking)
     #[arg(short, long, value_name = "PICTURE")]
     out: PathBuf,
     #[command(flatten)]
     backend: BackendOptions,
-    /// Most bytes that the grids may take, in MiB
-    #[arg(long, value_name = "MIB", default_value_t = Limits::default().max_bytes >> 20,
-          value_parser = clap::value_parser!(u64).range(1..1 << 43))]
-    max_mib: u64,
-    /// PLOT3D file with the values of the grid's nodes (q or f)
-    #[arg(long, value_name = "FILE")]
-    solution: Option<PathBuf>,
-    /// Grid of a file that has several: its number, from 0
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    grid: usize,
-    /// Values: their name or number; the first ones unless stated
-    #[arg(long, value_name = "WHICH")]
-    field: Option<String>,
+    /// Size of the picture in pixels
+    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = values::size)]
+    size: UVec2,
+    /// Where the picture is taken from, as of `brickfield render`
+    #[arg(long, value_name = "VIEW", default_value = "oblique")]
+    camera: Viewpoint,
+    /// Background behind the picture in PNG files, linear: R,G,B or one number for grey
+    #[arg(long, value_name = "RGB", default_value = "0", value_parser = values::background)]
+    background: Background,
+    /// Transfer function: a preset, or a JSON or TOML file of knots, as of `brickfield render`
+    #[arg(long, value_name = "TF", default_value = "linear")]
+    transfer: String,
+    /// Steps along the diagonal of the box around all cells
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    steps: u32,
+    /// exact (held to the reference) or fast (rays end where nothing shows any more)
+    #[arg(long, default_value = "exact", value_parser = values::mode)]
+    mode: Mode,
+    /// Quadrature rule: left-riemann, left-exponential, midpoint, pre-integrated or gauss2
+    #[arg(long, default_value = "midpoint", value_parser = values::rule)]
+    rule: QuadratureRule,
+    /// Planes of the grid that are drawn amid the cells, opaque and coloured by their values: i=N, j=N or k=N, from 0; may be repeated
+    #[arg(long, value_name = "PLANE", value_delimiter = ',', value_parser = values::plane)]
+    plane: Vec<GridPlane>,
+    /// Light on the planes
+    #[command(flatten)]
+    light: LightSourceOptions,
+    /// Draw the outlines of the planes' zones, so many pixels wide
+    #[arg(long, value_name = "PIXELS", requires = "plane", value_parser = values::positive, allow_hyphen_values = true)]
+    lines: Option<f64>,
+}
+
+#[derive(Args)]
+struct SurfaceArgs {
+    #[command(flatten)]
+    input: GridInput,
+    /// Picture to write: .exr (linear, for measuring) or .png (sRGB, for looking)
+    #[arg(short, long, value_name = "PICTURE")]
+    out: PathBuf,
+    #[command(flatten)]
+    backend: BackendOptions,
     /// Plane of the grid: i=N, j=N or k=N, from 0; k=0 unless stated, which of terrain is a height field
     #[arg(long, value_name = "PLANE", value_parser = values::plane)]
     plane: Option<GridPlane>,
@@ -313,6 +348,7 @@ fn main() -> ExitCode {
         Command::Pack(args) => pack::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Surface(args) => surface::run(&args),
+        Command::Cells(args) => cells::run(&args),
         #[cfg(feature = "serve")]
         Command::Serve(args) => serve::run(&args),
         Command::Backends => print(&listed_backends()),

@@ -2,31 +2,18 @@
 
 use std::sync::Arc;
 
-use brickfield::core::glam::{DMat3, DVec3, UVec3};
-use brickfield::core::{Aabb, Camera, Grid, GridPoints, NodeField, StructuredGrid, TransferFunction, ValueRange};
+use brickfield::core::{Camera, GridPoints, NodeField, StructuredGrid, TransferFunction, ValueRange};
 use brickfield::curvilinear::{BudgetSelector, CurvilinearGrid, GridPlane, QuadTree, Selection, SizeSelector, View};
 use brickfield::frame::{Coloring, MeshFrame, MeshLines, MeshPlan, MeshView};
-use brickfield::io::{GridOptions, Limits, OpenedGrids, WorldFrame, open_grid};
+use brickfield::io::WorldFrame;
 use brickfield::optics::read_transfer;
 use brickfield::options::OptionError;
 use brickfield::overlay::show_color_bar;
 use brickfield::{check_picture_path, spectrum, surface_mesh, write_picture};
 
 use crate::backend::check_validation;
+use crate::grid_input::{box_grid, check_plane, range_of};
 use crate::{Failure, SurfaceArgs, print};
-
-/// What of a file cannot be shown.
-#[derive(Debug, thiserror::Error)]
-enum SurfaceFault {
-    #[error("--grid {wanted}: the file has {n} grids, 0 to {}", n - 1)]
-    NoGrid { wanted: usize, n: usize },
-    #[error("--field {wanted:?}: the grid has {}", if names.is_empty() { "no values; state the file that has them by --solution" } else { names })]
-    NoField { wanted: String, names: String },
-    #[error("the grid has no values to be coloured by")]
-    NoValues,
-    #[error("--plane {axis}={index}: the grid has {n} nodes along {axis}, 0 to {}", n - 1)]
-    NoPlane { axis: char, index: u32, n: u32 },
-}
 
 pub(crate) fn run(args: &SurfaceArgs) -> Result<(), Failure> {
     check_picture_path(&args.out).map_err(Failure::usage)?;
@@ -34,8 +21,10 @@ pub(crate) fn run(args: &SurfaceArgs) -> Result<(), Failure> {
     let light = args.light.light(1.0).map_err(OptionError::from)?;
     let mut backend = args.backend.open()?;
     let subject = Subject::open(args)?;
-    let camera =
-        args.camera.camera(&subject.box_grid(), WorldFrame::default(), args.size).map_err(OptionError::from)?;
+    let camera = args
+        .camera
+        .camera(&box_grid(&subject.tree.extent(subject.tree.layout().root())), WorldFrame::default(), args.size)
+        .map_err(OptionError::from)?;
     let selection = subject.select(args, &camera)?;
     let mesh = Arc::new(surface_mesh(subject.tree.grid(), &selection, args.normals)?);
     let view = MeshView {
@@ -69,33 +58,16 @@ struct Subject {
 
 impl Subject {
     fn open(args: &SurfaceArgs) -> Result<Subject, Failure> {
-        let mut options = GridOptions::from(Limits { max_bytes: args.max_mib.saturating_mul(1 << 20) });
-        options.solution.clone_from(&args.solution);
-        let OpenedGrids { mut grids, notes, .. } = open_grid(&args.file, &options)?;
-        notes.iter().for_each(|note| eprintln!("note: {note}"));
-        let (wanted, n) = (args.grid, grids.len());
-        if wanted >= n {
-            return Err(Failure::usage(SurfaceFault::NoGrid { wanted, n }));
-        }
-        let grid = grids.swap_remove(wanted);
-        let field = field_of(&grid, args.field.as_deref()).map_err(Failure::usage)?;
+        let (grid, field) = args.input.open()?;
         let surface = zones(&grid, field, args)?;
         let NodeField { name, unit, .. } = &grid.fields()[field];
         let tree = Arc::new(QuadTree::build(surface));
-        let range = range_of(tree.grid());
+        let range = range_of(tree.grid().values());
         let colors = match &args.colors {
             Some(path) => read_transfer(path).map_err(OptionError::from)?,
             None => spectrum(range).map_err(OptionError::from)?,
         };
         Ok(Subject { tree, field: name.clone(), unit: unit.clone(), range, colors })
-    }
-
-    /// A grid of one voxel around the surface: cameras find their place by it.
-    fn box_grid(&self) -> Grid {
-        let Aabb { min, max } = self.tree.extent(self.tree.layout().root());
-        let size = (max - min).max(DVec3::splat((max - min).max_element() * 1e-6)).max(DVec3::splat(f64::MIN_POSITIVE));
-        Grid::from_first_sample(UVec3::ONE, size, min + 0.5 * size, DMat3::IDENTITY)
-            .expect("a box of a surface has a size")
     }
 
     fn select(&self, args: &SurfaceArgs, camera: &Camera) -> Result<Selection, Failure> {
@@ -120,44 +92,16 @@ impl Subject {
     }
 }
 
-/// The field that is asked for, by its number or name; the first one if none is.
-fn field_of(grid: &StructuredGrid, wanted: Option<&str>) -> Result<usize, SurfaceFault> {
-    let fields = grid.fields();
-    let Some(wanted) = wanted else {
-        return if fields.is_empty() { Err(SurfaceFault::NoValues) } else { Ok(0) };
-    };
-    let by_name = fields.iter().position(|field| field.name == wanted);
-    let by_number = wanted.parse().ok().filter(|i: &usize| *i < fields.len());
-    by_name.or(by_number).ok_or_else(|| SurfaceFault::NoField {
-        wanted: wanted.to_owned(),
-        names: fields.iter().map(|field| format!("{:?}", field.name)).collect::<Vec<_>>().join(", "),
-    })
-}
-
 /// The zones of the plane that is asked for; terrain is a height field unless it is to be flat.
 fn zones(grid: &StructuredGrid, field: usize, args: &SurfaceArgs) -> Result<CurvilinearGrid, Failure> {
-    let n = grid.n_nodes();
     let plane = args.plane.unwrap_or(GridPlane::K(0));
-    let (axis, index, n_along) = match plane {
-        GridPlane::I(i) => ('i', i, n.x),
-        GridPlane::J(j) => ('j', j, n.y),
-        GridPlane::K(k) => ('k', k, n.z),
-    };
-    if index >= n_along {
-        return Err(Failure::usage(SurfaceFault::NoPlane { axis, index, n: n_along }));
-    }
-    let is_terrain = n.z == 1 && args.plane.is_none() && matches!(grid.points(), GridPoints::Even { .. });
+    check_plane(grid, plane)?;
+    let is_terrain = grid.n_nodes().z == 1 && args.plane.is_none() && matches!(grid.points(), GridPoints::Even { .. });
     let made = match is_terrain {
         true => CurvilinearGrid::of_heights(grid, field, args.exaggeration),
         false => CurvilinearGrid::of_plane(grid, plane, field),
     };
     Ok(made?)
-}
-
-fn range_of(grid: &CurvilinearGrid) -> ValueRange {
-    let values = || grid.values().iter().filter(|v| !v.is_nan()).map(|v| f64::from(*v));
-    let (min, max) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-    if min <= max { ValueRange { min, max } } else { ValueRange { min: 0.0, max: 0.0 } }
 }
 
 fn attributes(
@@ -166,7 +110,7 @@ fn attributes(
     selection: &Selection,
     plan: &MeshPlan,
 ) -> Vec<(&'static str, String)> {
-    let file = args.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let file = args.input.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     vec![
         ("file", file),
         ("field", subject.field.clone()),

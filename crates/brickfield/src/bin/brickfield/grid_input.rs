@@ -1,0 +1,99 @@
+//! Structured grids of files, and what of them is shown.
+
+use std::path::PathBuf;
+
+use brickfield::core::glam::{DMat3, DVec3, UVec3};
+use brickfield::core::{Aabb, Grid, StructuredGrid, ValueRange};
+use brickfield::curvilinear::GridPlane;
+use brickfield::io::{GridOptions, Limits, OpenedGrids, open_grid};
+use clap::Args;
+
+use crate::Failure;
+
+/// A structured grid of a file, and its values.
+#[derive(Args)]
+pub(crate) struct GridInput {
+    /// File of structured grids: PLOT3D, HGT, USGS DEM, GeoTIFF, VTK (.vtr, .vts, .vtk)
+    pub(crate) file: PathBuf,
+    /// Most bytes that the grids may take, in MiB
+    #[arg(long, value_name = "MIB", default_value_t = Limits::default().max_bytes >> 20,
+          value_parser = clap::value_parser!(u64).range(1..1 << 43))]
+    max_mib: u64,
+    /// PLOT3D file with the values of the grid's nodes (q or f)
+    #[arg(long, value_name = "FILE")]
+    solution: Option<PathBuf>,
+    /// Grid of a file that has several: its number, from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    grid: usize,
+    /// Values: their name or number; the first ones unless stated
+    #[arg(long, value_name = "WHICH")]
+    field: Option<String>,
+}
+
+/// What of a file cannot be shown.
+#[derive(Debug, thiserror::Error)]
+enum GridFault {
+    #[error("--grid {wanted}: the file has {n} grids, 0 to {}", n - 1)]
+    NoGrid { wanted: usize, n: usize },
+    #[error("--field {wanted:?}: the grid has {}", if names.is_empty() { "no values; state the file that has them by --solution" } else { names })]
+    NoField { wanted: String, names: String },
+    #[error("the grid has no values to be coloured by; state the file that has them by --solution")]
+    NoValues,
+    #[error("--plane {axis}={index}: the grid has {n} nodes along {axis}, 0 to {}", n - 1)]
+    NoPlane { axis: char, index: u32, n: u32 },
+}
+
+impl GridInput {
+    /// The grid, and the number of its field; what the reader noticed is printed.
+    pub(crate) fn open(&self) -> Result<(StructuredGrid, usize), Failure> {
+        let mut options = GridOptions::from(Limits { max_bytes: self.max_mib.saturating_mul(1 << 20) });
+        options.solution.clone_from(&self.solution);
+        let OpenedGrids { mut grids, notes, .. } = open_grid(&self.file, &options)?;
+        notes.iter().for_each(|note| eprintln!("note: {note}"));
+        let (wanted, n) = (self.grid, grids.len());
+        if wanted >= n {
+            return Err(Failure::usage(GridFault::NoGrid { wanted, n }));
+        }
+        let grid = grids.swap_remove(wanted);
+        let field = self.field_of(&grid).map_err(Failure::usage)?;
+        Ok((grid, field))
+    }
+
+    fn field_of(&self, grid: &StructuredGrid) -> Result<usize, GridFault> {
+        let fields = grid.fields();
+        let Some(wanted) = &self.field else {
+            return if fields.is_empty() { Err(GridFault::NoValues) } else { Ok(0) };
+        };
+        let by_name = fields.iter().position(|field| field.name == *wanted);
+        let by_number = wanted.parse().ok().filter(|i: &usize| *i < fields.len());
+        by_name.or(by_number).ok_or_else(|| GridFault::NoField {
+            wanted: wanted.clone(),
+            names: fields.iter().map(|field| format!("{:?}", field.name)).collect::<Vec<_>>().join(", "),
+        })
+    }
+}
+
+/// Refuses a plane that the grid does not have.
+pub(crate) fn check_plane(grid: &StructuredGrid, plane: GridPlane) -> Result<(), Failure> {
+    let nodes = grid.n_nodes();
+    let (axis, index, n) = match plane {
+        GridPlane::I(i) => ('i', i, nodes.x),
+        GridPlane::J(j) => ('j', j, nodes.y),
+        GridPlane::K(k) => ('k', k, nodes.z),
+    };
+    if index < n { Ok(()) } else { Err(Failure::usage(GridFault::NoPlane { axis, index, n })) }
+}
+
+/// A grid of one voxel, which is a box: cameras find their place by it.
+pub(crate) fn box_grid(around: &Aabb) -> Grid {
+    let extent = around.max - around.min;
+    let size = extent.max(DVec3::splat(extent.max_element() * 1e-6)).max(DVec3::splat(f64::MIN_POSITIVE));
+    Grid::from_first_sample(UVec3::ONE, size, around.min + 0.5 * size, DMat3::IDENTITY).expect("a box has a size")
+}
+
+/// The range of values that are no holes; 0 to 0 if all are.
+pub(crate) fn range_of(values: &[f32]) -> ValueRange {
+    let values = || values.iter().filter(|v| v.is_finite()).map(|v| f64::from(*v));
+    let (min, max) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+    if min <= max { ValueRange { min, max } } else { ValueRange { min: 0.0, max: 0.0 } }
+}
