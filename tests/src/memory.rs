@@ -1,4 +1,4 @@
-//! Main memory, where the system tells it.
+//! Main memory and processor time, where the system tells them.
 
 /// Bytes that a new process may take without swapping (Linux: `MemAvailable`).
 pub(crate) fn available() -> Option<u64> {
@@ -18,6 +18,15 @@ pub(crate) fn peak() -> Option<u64> {
 /// Counts the peak anew. Where the system refuses, the peak is that of the whole process: never too little.
 pub(crate) fn restart_peak() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
+}
+
+/// The seconds that all threads of this process have run (Linux: in hundredths).
+pub(crate) fn cpu_seconds() -> Option<f64> {
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The name of the program, in brackets, may hold anything.
+    let mut behind_name = stat.rsplit_once(')')?.1.split_whitespace().skip(11);
+    let mut ticks = || behind_name.next()?.parse::<f64>().ok();
+    Some((ticks()? + ticks()?) / 100.0)
 }
 
 fn of_process(name: &str) -> Option<u64> {

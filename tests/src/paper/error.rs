@@ -25,6 +25,10 @@ pub enum PaperError {
     NotTerrain { path: PathBuf },
     #[error(transparent)]
     Surface(#[from] brickfield::SurfaceError),
+    #[error(transparent)]
+    Cells(#[from] brickfield::frame::CellsError),
+    #[error(transparent)]
+    CellsPlan(#[from] brickfield::frame::CellsPlanError),
     #[error("--out {}: {source}", path.display())]
     Out { path: PathBuf, source: io::Error },
     #[error(transparent)]

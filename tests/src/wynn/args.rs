@@ -42,6 +42,8 @@ pub enum Part {
     Mandelbrot,
     /// Frame times on a flight, with and without prediction
     Flight,
+    /// Three dimensions: cells as a volume, planes as surfaces, and both
+    Cells,
     /// Generated grids: time to build, bytes of a zone, time to select, memory
     Large,
 }
@@ -55,6 +57,7 @@ impl Part {
             Part::Zoom => "Figure 15: six times as large",
             Part::Mandelbrot => "Figure 16: mesh lines",
             Part::Flight => "Frame times on a flight",
+            Part::Cells => "Three dimensions",
             Part::Large => "Generated grids",
         }
     }
@@ -69,7 +72,7 @@ impl WynnArgs {
     /// The parts to be run, each once.
     pub fn parts(&self) -> Vec<Part> {
         match self.part.is_empty() {
-            true => asked_parts(&[Part::Table, Part::Errors, Part::Zoom, Part::Mandelbrot, Part::Flight]),
+            true => asked_parts(&[Part::Table, Part::Errors, Part::Zoom, Part::Mandelbrot, Part::Flight, Part::Cells]),
             false => asked_parts(&self.part),
         }
     }
