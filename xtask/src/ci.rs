@@ -125,6 +125,11 @@ fn steps() -> Result<Vec<Step>> {
     let rows = ["--part", "stores,bytes,served", "--only", "LIDC2", "--size", "64x64"];
     let delivery = [&of_saladi[..], &rows].concat();
     steps.push(step_with_data("stores that arrive bit by bit", move || checked("compare", &delivery).run()));
+    let of_wynn = ["--paper", "wynn", "--check=pictures", "--require", "wgpu,ash"];
+    let rows = ["--part", "zoom,cells", "--size", "96x96", "--frames", "1"];
+    let surfaces = [&of_wynn[..], &rows].concat();
+    steps
+        .push(step_with_data("surfaces and volumes of curvilinear grids", move || checked("compare", &surfaces).run()));
     let rows = ["--codecs", "--part", "upload", "--only", "tooth", "--frames", "1", "--require", "wgpu,ash"];
     steps.push(step_with_data("packed uploads", move || checked("compare", &rows).run()));
     Ok(steps)

@@ -23,11 +23,18 @@ use crate::memory::cpu_seconds;
 use crate::metrics::{greatest_difference, median};
 use crate::paper::{Missed, PaperError, data_sets, print};
 
-/// Grids, the files of their values, and the CPU seconds of VTK 9.7.2 for a picture of 512 x 512 (unstructured ray cast; projected tetrahedra), measured on
-/// a machine like this project's.
-const DATA: [(&str, &str, [f64; 2]); 2] = [
-    ("curvilinear/bluntfinxyz.bin", "curvilinear/bluntfinq.bin", [2.08, 1.51]),
-    ("curvilinear/combxyz.bin", "curvilinear/combq.bin", [2.56, 1.71]),
+/// A grid of PLOT3D, as paths below the folder of real data.
+struct DataSet {
+    grid: &'static str,
+    values: &'static str,
+    /// CPU seconds of VTK 9.7.2 for a picture of 512 x 512, by its unstructured ray cast and by projected tetrahedra, measured on a machine like
+    /// this project's.
+    vtk: [f64; 2],
+}
+
+const DATA: [DataSet; 2] = [
+    DataSet { grid: "curvilinear/bluntfinxyz.bin", values: "curvilinear/bluntfinq.bin", vtk: [2.08, 1.51] },
+    DataSet { grid: "curvilinear/combxyz.bin", values: "curvilinear/combq.bin", vtk: [2.56, 1.71] },
 ];
 const SIZE: UVec2 = UVec2::new(512, 512);
 /// Steps along the diagonal of the box around all cells.
@@ -63,7 +70,7 @@ struct Subject {
 
 /// Whether the data are there.
 pub(super) fn check_data(args: &WynnArgs) -> Result<(), PaperError> {
-    let missing = files(args)?.into_iter().flat_map(|(_, grid, values, _)| [grid, values]).find(|path| !path.exists());
+    let missing = files(args)?.into_iter().flat_map(|f| [f.grid, f.values]).find(|path| !path.exists());
     missing.map_or(Ok(()), |path| Err(PaperError::NoVolume { path }))
 }
 
@@ -74,8 +81,8 @@ pub(super) fn run(args: &WynnArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, P
         SIZE.x, SIZE.y, args.common.frames
     ))?;
     let (mut rows, mut missed) = (Vec::new(), Vec::new());
-    for (name, grid, values, vtk) in files(args)? {
-        let subject = Subject::open(name, grid, values, vtk)?;
+    for files in files(args)? {
+        let subject = Subject::open(files)?;
         let n = subject.cells.n_cells();
         print(&format!(
             "{}: {} x {} x {} cells, {} to {}; VTK: ray cast {} s, projected tetrahedra {} s of CPU",
@@ -131,27 +138,34 @@ impl Picture {
     }
 }
 
-fn files(args: &WynnArgs) -> Result<Vec<(String, PathBuf, PathBuf, [f64; 2])>, PaperError> {
+/// A data set's files.
+struct Files {
+    name: String,
+    grid: PathBuf,
+    values: PathBuf,
+    vtk: [f64; 2],
+}
+
+fn files(args: &WynnArgs) -> Result<Vec<Files>, PaperError> {
     let folder = args.common.data.as_ref();
-    let names = DATA.map(|(grid, ..)| grid);
-    let named = data_sets(folder, args.common.only.as_deref(), &names)?;
-    let with_values = |(name, path): (String, PathBuf)| {
-        let (_, values, vtk) = DATA.into_iter().find(|(grid, ..)| *grid == name)?;
-        Some((name, path, folder?.join(values), vtk))
+    let named = data_sets(folder, args.common.only.as_deref(), &DATA.map(|set| set.grid))?;
+    let with_values = |(name, grid): (String, PathBuf)| {
+        let DataSet { values, vtk, .. } = DATA.into_iter().find(|set| set.grid == name)?;
+        Some(Files { name, grid, values: folder?.join(values), vtk })
     };
     Ok(named.into_iter().filter_map(with_values).collect())
 }
 
 impl Subject {
-    fn open(name: String, path: PathBuf, values: PathBuf, vtk: [f64; 2]) -> Result<Subject, PaperError> {
+    fn open(files: Files) -> Result<Subject, PaperError> {
         let mut options = GridOptions::default();
-        options.solution = Some(values);
-        let grid = open_grid(&path, &options)?.grids.swap_remove(0);
+        options.solution = Some(files.values);
+        let grid = open_grid(&files.grid, &options)?.grids.swap_remove(0);
         let cells = Arc::new(Cells::of_grid(&grid, 0)?);
         let range = range_of(&grid.fields()[0].values);
         let of = |position: [f32; 3]| cells.center() + DVec3::from(position.map(f64::from));
         let around = Aabb::of_points(cells.nodes().iter().map(|node| of(node.position)));
-        Ok(Subject { name, vtk, grid, range, around, cells })
+        Ok(Subject { name: files.name, vtk: files.vtk, grid, range, around, cells })
     }
 
     fn draw(

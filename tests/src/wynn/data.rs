@@ -55,7 +55,7 @@ impl Terrain {
     }
 
     /// All of it from above, by parallel rays, in a square picture; `zoom` times as large, its middle in the middle.
-    pub(super) fn from_above(&self, size: UVec2, zoom: f64) -> Result<View, PaperError> {
+    pub(super) fn seen_from_above(&self, size: UVec2, zoom: f64) -> Result<View, PaperError> {
         let extent = self.tree.extent(self.tree.layout().root());
         let (middle, around) = (extent.center(), extent.max - extent.min);
         let height = around.x.max(around.y) * 1.02 / zoom;

@@ -107,7 +107,7 @@ fn without_holes(grid: &CurvilinearGrid, side: u32) -> Option<[u32; 2]> {
 }
 
 fn compare(terrain: &Terrain, k: u32) -> Result<Vec<ErrorRow>, PaperError> {
-    let view = terrain.from_above(UVec2::splat(640), 1.0)?;
+    let view = terrain.seen_from_above(UVec2::splat(640), 1.0)?;
     let of_zones = zones(terrain, &view);
     let (of_rtin, of_uniform) = (networks(terrain, k), uniform(terrain));
     let fewest = |samples: &[Sample], error: fn(&Sample) -> f64, percent: f64| {

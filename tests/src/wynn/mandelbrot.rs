@@ -20,7 +20,7 @@ const GRANULARITY: f64 = 32.0;
 
 pub(super) fn run(args: &WynnArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, PaperError> {
     let terrain = Terrain::new("perturbed Mandelbrot set".to_owned(), perturbed());
-    let view = terrain.from_above(args.common.size, 1.0)?;
+    let view = terrain.seen_from_above(args.common.size, 1.0)?;
     let lines = MeshLines { width: 1.0, color: [0.0; 3] };
     print(&format!("{N} x {N} zones; lines of 1 pixel"))?;
     for (name, granularity) in [("constrained", Some(GRANULARITY)), ("all", None)] {

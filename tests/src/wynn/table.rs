@@ -47,7 +47,7 @@ pub(super) fn run(args: &WynnArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, P
     let mut rows = Vec::new();
     for terrain in terrains(args)? {
         let terrain = terrain?;
-        let view = terrain.from_above(size, 1.0)?;
+        let view = terrain.seen_from_above(size, 1.0)?;
         print(&format!("{}: {} to {}", terrain.name, terrain.range.min, terrain.range.max))?;
         for backend in &mut rivals.present {
             print("  backend  asked for          frames/s    zones  triangles   error %   deviation %")?;

@@ -22,7 +22,7 @@ pub(super) fn run(args: &WynnArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, P
     let mut missed = Vec::new();
     for terrain in terrains(args)? {
         let terrain = terrain?;
-        let view = terrain.from_above(args.common.size, ZOOM)?;
+        let view = terrain.seen_from_above(args.common.size, ZOOM)?;
         let mut selector = BudgetSelector::new(Arc::clone(&terrain.tree));
         selector.update(&view, PAPER.0);
         let selection = selector.selection();

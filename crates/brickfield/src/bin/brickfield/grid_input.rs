@@ -34,13 +34,13 @@ pub(crate) struct GridInput {
 #[derive(Debug, thiserror::Error)]
 enum GridFault {
     #[error("--grid {wanted}: the file has {n} grids, 0 to {}", n - 1)]
-    NoGrid { wanted: usize, n: usize },
+    Grid { wanted: usize, n: usize },
     #[error("--field {wanted:?}: the grid has {}", if names.is_empty() { "no values; state the file that has them by --solution" } else { names })]
-    NoField { wanted: String, names: String },
+    Field { wanted: String, names: String },
     #[error("the grid has no values to be coloured by; state the file that has them by --solution")]
-    NoValues,
+    Values,
     #[error("--plane {axis}={index}: the grid has {n} nodes along {axis}, 0 to {}", n - 1)]
-    NoPlane { axis: char, index: u32, n: u32 },
+    Plane { axis: char, index: u32, n: u32 },
 }
 
 impl GridInput {
@@ -52,7 +52,7 @@ impl GridInput {
         notes.iter().for_each(|note| eprintln!("note: {note}"));
         let (wanted, n) = (self.grid, grids.len());
         if wanted >= n {
-            return Err(Failure::usage(GridFault::NoGrid { wanted, n }));
+            return Err(Failure::usage(GridFault::Grid { wanted, n }));
         }
         let grid = grids.swap_remove(wanted);
         let field = self.field_of(&grid).map_err(Failure::usage)?;
@@ -62,11 +62,11 @@ impl GridInput {
     fn field_of(&self, grid: &StructuredGrid) -> Result<usize, GridFault> {
         let fields = grid.fields();
         let Some(wanted) = &self.field else {
-            return if fields.is_empty() { Err(GridFault::NoValues) } else { Ok(0) };
+            return if fields.is_empty() { Err(GridFault::Values) } else { Ok(0) };
         };
         let by_name = fields.iter().position(|field| field.name == *wanted);
         let by_number = wanted.parse().ok().filter(|i: &usize| *i < fields.len());
-        by_name.or(by_number).ok_or_else(|| GridFault::NoField {
+        by_name.or(by_number).ok_or_else(|| GridFault::Field {
             wanted: wanted.clone(),
             names: fields.iter().map(|field| format!("{:?}", field.name)).collect::<Vec<_>>().join(", "),
         })
@@ -81,7 +81,7 @@ pub(crate) fn check_plane(grid: &StructuredGrid, plane: GridPlane) -> Result<(),
         GridPlane::J(j) => ('j', j, nodes.y),
         GridPlane::K(k) => ('k', k, nodes.z),
     };
-    if index < n { Ok(()) } else { Err(Failure::usage(GridFault::NoPlane { axis, index, n })) }
+    if index < n { Ok(()) } else { Err(Failure::usage(GridFault::Plane { axis, index, n })) }
 }
 
 /// A grid of one voxel, which is a box: cameras find their place by it.
