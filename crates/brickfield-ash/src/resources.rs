@@ -147,11 +147,13 @@ impl Resources {
         for (resource, chunks) in lists {
             self.entry(*resource).make_room(&device, queue, *chunks)?;
         }
-        let n_bytes = self.fill(queue, staging, numbers, lists)?;
+        let filled = self.fill(queue, staging, numbers, lists);
         for (resource, chunks) in lists {
-            self.entry(*resource).held.hold(*chunks);
+            let held = &mut self.entry(*resource).held;
+            // A list that was not written whole may have lost chunks that it had.
+            if filled.is_ok() { held.hold(*chunks) } else { held.forget() }
         }
-        Ok(n_bytes)
+        filled
     }
 
     /// Brings the slots that a texture lacks; the bytes that were brought.
@@ -268,16 +270,16 @@ impl Reused {
     /// Makes room for chunks, and keeps the chunks that are there; a buffer that must grow gets a quarter more than it had.
     fn make_room(&mut self, device: &Arc<Device>, queue: &mut Queue, content: &dyn Chunked) -> Result<(), RenderError> {
         let n_bytes = content.n_bytes();
-        let Some(old) = self.buffer.take_if(|b| b.n_bytes() < n_bytes) else {
+        let Some(old) = self.buffer.as_ref().filter(|b| b.n_bytes() < n_bytes) else {
             return self.reserve(device, n_bytes as usize).map(drop);
         };
+        // Until the larger buffer is filled the old one stays: a list that is refused leaves everything as it was.
         self.check(device, n_bytes)?;
-        self.used_bytes = n_bytes;
         let limit = u64::from(device.physical().limits.max_storage_buffer_range);
         let size = n_bytes.max((old.n_bytes() + old.n_bytes() / 4).next_multiple_of(4).min(limit));
         let larger = Buffer::on_device(device, self.what, size, self.usage)?;
-        queue.run("moving a list", |recorder| recorder.copy((&old, 0), (&larger, 0), old.n_bytes()))?;
-        self.buffer = Some(larger);
+        queue.run("moving a list", |recorder| recorder.copy((old, 0), (&larger, 0), old.n_bytes()))?;
+        (self.used_bytes, self.buffer) = (n_bytes, Some(larger));
         Ok(())
     }
 

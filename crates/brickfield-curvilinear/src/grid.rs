@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use brickfield_core::Aabb;
 use brickfield_core::glam::{DVec3, Vec3};
 
 use crate::{LayoutError, QuadLayout};
@@ -209,6 +210,13 @@ impl CurvilinearGrid {
                 field.at(node, if value.is_nan() { 0.0 } else { f64::from(value) })
             }
         }
+    }
+
+    /// The box around all nodes that are no holes; `None` if all are.
+    pub fn extent(&self) -> Option<Aabb> {
+        let nodes = (0..self.values.len()).filter(|i| !self.values[*i].is_nan()).map(|i| self.position(self.node(i)));
+        let around = Aabb::of_points(nodes);
+        (around.min.x <= around.max.x).then_some(around)
     }
 
     /// The node that stands for a node and, if it lies on a seam, for its copies.

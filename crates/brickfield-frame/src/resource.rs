@@ -273,8 +273,8 @@ impl CellsPlan {
             Resource::Boxes => Some(Content::Chunks(cells.box_table())),
             Resource::Voids => Some(Content::Chunks(cells.void_table())),
             Resource::Ends => {
-                let ends = self.behind()?;
-                Some(Content::Bytes(Cow::Borrowed(bytemuck::cast_slice(ends.pixels()))))
+                let ends = self.ends()?;
+                bytes(bytemuck::cast_slice(&ends))
             }
             _ => None,
         }

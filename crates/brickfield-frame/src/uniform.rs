@@ -196,14 +196,14 @@ impl FrameUniforms {
         let (rays, cells, unit) = (plan.rays(), plan.cells(), plan.unit());
         let (step, values) = (plan.sampling().step_world(), plan.value_scale());
         let is_parallel = rays.are_parallel();
-        // A whole number of steps before the nearest cell.
-        let nearest = (rays.eye().length() - cells.radius()).max(0.0);
-        let start = (nearest / step).floor() * step;
+        let start = plan.start();
+        // Values are counted from a number of f32 near the origin: the difference keeps their digits.
+        let counted_from = values.origin() as f32;
         let handedness = match cells.handedness() {
             Handedness::Right => 1.0,
             Handedness::Left => -1.0,
         };
-        let mut uniforms = FrameUniforms {
+        FrameUniforms {
             anchor: float3(rays.anchor[0] / unit),
             anchor_past_start: ((rays.anchor_depth - start) / unit) as f32,
             anchor_right: float3(rays.anchor[1] / unit),
@@ -217,15 +217,15 @@ impl FrameUniforms {
             direction_down: float3(rays.direction[2]),
             transmittance_floor: plan.sampling().transmittance_floor() as f32,
             sample_scale: values.unit().recip() as f32,
-            sample_offset: (-values.origin() / values.unit()) as f32,
+            sample_offset: ((f64::from(counted_from) - values.origin()) / values.unit()) as f32,
+            counted_from,
             index_dims: cells.n_cells().to_array(),
             n_knots: plan.transfer().knots().len() as u32,
             voxel_world: [unit as f32, handedness, 0.0],
             size: rays.size.to_array(),
             ..FrameUniforms::zeroed()
-        };
-        uniforms = uniforms.in_pass(&Pass::whole_rays(0..rays.size.y));
-        uniforms
+        }
+        .in_pass(&Pass::whole_rays(0..rays.size.y))
     }
 
     /// The uniform block for one pass.

@@ -43,10 +43,16 @@ pub fn n_rays_that_go_on(plan: &FramePlan, group_height: u32) -> u64 {
 /// # Errors
 /// Rays that may pass so many cells and segments that an invocation's loops would end without a word.
 pub fn rows_of_cells(plan: &CellsPlan) -> Result<Vec<Range<u32>>, RenderError> {
-    let n_cells = f64::from(plan.cells().n_cells().element_sum());
+    // A ray may pass a bent axis there and back.
+    let n_cells = 2.0 * f64::from(plan.cells().n_cells().element_sum());
     let n_segments = 2.0 * plan.cells().radius() / plan.sampling().step_world();
-    // A cell goes round the walk once, and once more for its segments; the last segment walks again.
-    let rounds = ROUNDS_OF_FACES + 3.0 * n_cells + 2.0 * n_segments;
+    let rule = plan.sampling().rule();
+    let n_knots = plan.transfer().knots().len();
+    // A cell goes round the walk once, and once for its segments, and the last segment walks again. A segment goes round once, and for
+    // each node as often as its place in a cell is improved.
+    let of_places = rule.nodes().len() as f64 * ROUNDS_OF_PLACE;
+    let of_segment = 2.0 + of_places + rounds_of_knots(rule, n_knots, KnotSearch::among(n_knots));
+    let rounds = ROUNDS_OF_FACES + 3.0 * n_cells + of_segment * n_segments;
     if rounds > MOST_ROUNDS {
         return Err(RenderError::Unsupported { what: "walk rays of so many cells and segments in one dispatch" });
     }
@@ -60,7 +66,9 @@ pub fn rows_of_cells(plan: &CellsPlan) -> Result<Vec<Range<u32>>, RenderError> {
 const CELL_ROWS: u32 = 8;
 /// The work of a cell, in values of a field.
 const CELL_VALUES: f64 = 8.0;
-/// Rounds of the searches for faces where a ray enters.
+/// The most rounds in which a place in a cell is found (`cells.wesl`).
+const ROUNDS_OF_PLACE: f64 = 12.0;
+/// Rounds of the searches for faces where a ray enters: of some hundred rows of cells.
 const ROUNDS_OF_FACES: f64 = 8192.0;
 
 /// Whether rays need several passes.
@@ -101,22 +109,26 @@ fn rounds_of_bricks(plan: &FramePlan) -> f64 {
 /// each bit of a light's shininess.
 fn rounds_per_segment(plan: &FramePlan) -> f64 {
     let rule = plan.sampling().rule();
-    let n_knots = plan.transfer().knots().len() as f64;
+    let n_knots = plan.transfer().knots().len();
     let n_nodes = rule.nodes().len() as f64;
-    let pieces = match rule {
-        QuadratureRule::PreIntegrated => n_knots + 1.0,
-        // Two halves.
-        _ if plan.spreads().is_some() => (n_knots + 3.0) * n_nodes,
+    let halves = match plan.spreads() {
+        Some(_) if rule != QuadratureRule::PreIntegrated => (n_knots as f64 + 3.0) * n_nodes,
         _ => 0.0,
-    };
-    let search = match KnotSearch::of(plan) {
-        KnotSearch::Unrolled(_) => 0.0,
-        KnotSearch::Loop => (n_knots.log2() + 1.0).floor() * n_nodes,
     };
     let blocks = if plan.field().dense_level().is_none() && plan.field().join() != Join::Shared { 8.0 } else { 0.0 };
     let bits = plan.lighting().map_or(0, |l| u32::BITS - l.light.terms().shininess.leading_zeros());
-    let nodes = rule.nodes().len() as f64 * (blocks * values_per_node(plan) + f64::from(bits));
-    3.0 + pieces + search + nodes
+    let nodes = n_nodes * (blocks * values_per_node(plan) + f64::from(bits));
+    3.0 + halves + rounds_of_knots(rule, n_knots, KnotSearch::of(plan)) + nodes
+}
+
+/// How often the loops over knots go round for a segment, at most: for each piece between knots, and for each halving of a search that is a loop.
+fn rounds_of_knots(rule: QuadratureRule, n_knots: usize, search: KnotSearch) -> f64 {
+    let n_knots = n_knots as f64;
+    let pieces = if rule == QuadratureRule::PreIntegrated { n_knots + 1.0 } else { 0.0 };
+    match search {
+        KnotSearch::Unrolled(_) => pieces,
+        KnotSearch::Loop => pieces + (n_knots.log2() + 1.0).floor() * rule.nodes().len() as f64,
+    }
 }
 
 /// Values of the field that a node asks for: with light, six more for its gradient, or the stored one.

@@ -53,6 +53,17 @@ impl Reused {
             return Ok(0);
         }
         self.make_room(device, content.n_bytes())?;
+        let written = self.write_missing(device, content);
+        // A list that was not written whole may have lost chunks that it had.
+        if written.is_ok() {
+            self.held.hold(content)
+        } else {
+            self.held.forget()
+        }
+        written
+    }
+
+    fn write_missing(&self, device: &Device, content: &dyn Chunked) -> Result<u64, RenderError> {
         let (what, Some(buffer)) = (self.what, &self.buffer) else { return Ok(0) };
         let (mut n_bytes, chunk_bytes) = (0, content.chunk_bytes());
         for run in self.held.missing(content) {
@@ -65,25 +76,24 @@ impl Reused {
                 n_bytes += bytes.len() as u64;
             }
         }
-        self.held.hold(content);
         Ok(n_bytes)
     }
 
     /// Makes room for `n_bytes` in all, and keeps the bytes that are there; a buffer that must grow gets a quarter more than it had.
     fn make_room(&mut self, device: &Device, n_bytes: u64) -> Result<(), RenderError> {
-        let Some(old) = self.buffer.take_if(|b| b.size() < n_bytes) else {
+        let Some(old) = self.buffer.as_ref().filter(|b| b.size() < n_bytes) else {
             return self.reserve(device, n_bytes).map(drop);
         };
+        // Until the larger buffer is filled the old one stays: a list that is refused leaves everything as it was.
         self.check(device, n_bytes)?;
-        self.n_bytes = n_bytes;
         let size = n_bytes.max((old.size() + old.size() / 4).min(self.limit(device)));
         let larger = self.create(device, size)?;
         device.checked(self.what, size, || {
             let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            encoder.copy_buffer_to_buffer(&old, 0, &larger, 0, old.size());
+            encoder.copy_buffer_to_buffer(old, 0, &larger, 0, old.size());
             device.queue.submit([encoder.finish()]);
         })?;
-        self.buffer = Some(larger);
+        (self.n_bytes, self.buffer) = (n_bytes, Some(larger));
         Ok(())
     }
 

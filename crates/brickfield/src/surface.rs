@@ -65,13 +65,39 @@ pub fn surface_mesh(
 /// # Errors
 /// More triangles than a mesh may have.
 pub fn mesh_of(grid: &CurvilinearGrid, surrogate: &SurrogateMesh, normals: SurfaceNormals) -> Result<Mesh, MeshError> {
-    let triangle = |corners: &[u32; 3]| MeshTriangle { corners: *corners, edges: outline(surrogate, *corners) };
-    let triangles = surrogate.triangles.par_iter().map(triangle).collect();
-    let normals: Option<Vec<DVec3>> = match normals {
-        SurfaceNormals::Triangles => None,
-        SurfaceNormals::Grid => Some(surrogate.nodes.par_iter().map(|node| normal(grid, *node)).collect()),
-    };
-    Mesh::new(&surrogate.positions, &surrogate.values, normals.as_deref(), triangles)
+    let mut parts = Parts::default();
+    parts.add(grid, surrogate, normals);
+    parts.mesh(normals)
+}
+
+/// Triangles of several grids.
+#[derive(Default)]
+struct Parts {
+    positions: Vec<DVec3>,
+    values: Vec<f32>,
+    normals: Vec<DVec3>,
+    triangles: Vec<MeshTriangle>,
+}
+
+impl Parts {
+    fn add(&mut self, grid: &CurvilinearGrid, surrogate: &SurrogateMesh, normals: SurfaceNormals) {
+        let first = self.positions.len() as u32;
+        let triangle = |corners: &[u32; 3]| MeshTriangle {
+            corners: corners.map(|corner| corner + first),
+            edges: outline(surrogate, *corners),
+        };
+        self.triangles.par_extend(surrogate.triangles.par_iter().map(triangle));
+        if normals == SurfaceNormals::Grid {
+            self.normals.par_extend(surrogate.nodes.par_iter().map(|node| normal(grid, *node)));
+        }
+        self.positions.extend_from_slice(&surrogate.positions);
+        self.values.extend_from_slice(&surrogate.values);
+    }
+
+    fn mesh(self, normals: SurfaceNormals) -> Result<Mesh, MeshError> {
+        let normals = (normals == SurfaceNormals::Grid).then_some(self.normals.as_slice());
+        Mesh::new(&self.positions, &self.values, normals, self.triangles)
+    }
 }
 
 /// The mesh of all final zones of several grids: planes of one volume, say.
@@ -79,26 +105,15 @@ pub fn mesh_of(grid: &CurvilinearGrid, surrogate: &SurrogateMesh, normals: Surfa
 /// # Errors
 /// More triangles than a mesh may have.
 pub fn joined_mesh(grids: &[CurvilinearGrid], normals: SurfaceNormals) -> Result<Mesh, SurfaceError> {
-    let (mut positions, mut values, mut of_nodes) = (Vec::new(), Vec::new(), Vec::new());
-    let mut triangles: Vec<MeshTriangle> = Vec::new();
+    let mut parts = Parts::default();
     for grid in grids {
         let tree = QuadTree::build(grid.clone());
         let finest = 0..tree.layout().n_zones(Level(0));
         let zones = finest.map(|i| tree.layout().zone_at(Level(0), i)).filter(|zone| tree.summary(*zone).is_nice());
         let selection = Selection::of_leaves(&tree, zones).expect("final zones without holes");
-        let surrogate = surrogate_mesh(grid, &selection)?;
-        let first = positions.len() as u32;
-        let moved = |corners: &[u32; 3]| MeshTriangle {
-            corners: corners.map(|corner| corner + first),
-            edges: outline(&surrogate, *corners),
-        };
-        triangles.extend(surrogate.triangles.iter().map(moved));
-        of_nodes.extend(surrogate.nodes.iter().map(|node| normal(grid, *node)));
-        positions.extend_from_slice(&surrogate.positions);
-        values.extend_from_slice(&surrogate.values);
+        parts.add(grid, &surrogate_mesh(grid, &selection)?, normals);
     }
-    let normals = (normals == SurfaceNormals::Grid).then_some(of_nodes.as_slice());
-    Ok(Mesh::new(&positions, &values, normals, triangles)?)
+    Ok(parts.mesh(normals)?)
 }
 
 /// The edges of a triangle that are parts of its zone's outline: only those stay within a row or a column of nodes.

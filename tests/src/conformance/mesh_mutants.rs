@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use brickfield::curvilinear::{Node, SurrogateMesh};
 use brickfield::frame::{Coloring, Mesh, MeshLines, MeshPlan, MeshTriangle, MeshView};
-use brickfield_core::glam::DVec3;
+use brickfield_core::glam::{DVec3, UVec2};
+use brickfield_core::{Camera, Projection};
 use brickfield_optics::{Light, LightSource};
 
 use super::meshes::PreparedMesh;
@@ -18,7 +19,7 @@ pub enum MeshMutant {
     NotStitched,
     /// A triangle in front is missing.
     TriangleMissing,
-    /// Rays pass the pixels' corners, not their centres.
+    /// Rays pass the pixels' corners, not their centres: the camera is half a pixel off.
     PixelCorner,
     /// The picture is upside down.
     RowsFlipped,
@@ -86,10 +87,8 @@ impl MeshMutant {
                 test.plan(&surrogate, view)
             }
             MeshMutant::PixelCorner => {
-                let mut rays = *plan.rays();
-                rays.anchor[0] -= 0.5 * (rays.anchor[1] + rays.anchor[2]);
-                rays.direction[0] -= 0.5 * (rays.direction[1] + rays.direction[2]);
-                plan.clone().with_rays(rays)
+                let camera = half_a_pixel_off(&test.view.camera, plan.size());
+                test.plan(surrogate, MeshView { camera, ..test.view.clone() })
             }
             MeshMutant::RowsFlipped => {
                 let mut rays = *plan.rays();
@@ -186,10 +185,20 @@ fn unstitched(honest: &PreparedMesh) -> SurrogateMesh {
     SurrogateMesh { triangles, ..surrogate.clone() }
 }
 
+/// A camera whose picture lies half a pixel to the right and below.
+fn half_a_pixel_off(camera: &Camera, size: UVec2) -> Camera {
+    let way = 0.5 * camera.pixel_rays(size).pixel() * (camera.up() - camera.right());
+    let (eye, target) = match camera.projection() {
+        Projection::Orthographic { .. } => (camera.eye() + way, camera.eye() + way + camera.forward()),
+        Projection::Perspective { .. } => (camera.eye(), camera.eye() + camera.forward() + way),
+    };
+    Camera::look_at(eye, target, camera.up(), camera.projection()).expect("half a pixel turns no camera over")
+}
+
 fn with_triangles(plan: &MeshPlan, view: MeshView, edit: impl Fn(MeshTriangle) -> MeshTriangle) -> MeshPlan {
     let mesh = plan.mesh();
     let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
-    let positions: Vec<DVec3> = mesh.vertices().iter().map(|v| mesh.center() + vector(v.position)).collect();
+    let positions: Vec<DVec3> = (0..mesh.vertices().len() as u32).map(|i| mesh.center() + mesh.position(i)).collect();
     let values: Vec<f32> = mesh.vertices().iter().map(|v| v.value).collect();
     let normals: Vec<DVec3> = mesh.vertices().iter().map(|v| vector(v.normal)).collect();
     let triangles = mesh.triangles().iter().map(|t| edit(*t)).collect();

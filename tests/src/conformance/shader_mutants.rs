@@ -282,10 +282,14 @@ mutants! {
     UNPREDICTED: "unpredicted", "decode", "undo_line", "is_predicted && n_low > 1u" => "false";
     /// Corners have each other's weights.
     MESH_WEIGHTS_SWAPPED: "mesh-weights-swapped", "mesh", "mixed", "a * seen.weight.x + b * seen.weight.y" => "b * seen.weight.x + a * seen.weight.y";
-    /// A colour map is continuous from the left at a jump.
+    /// Colours are constant between knots.
     MESH_COLOR_BELOW: "mesh-color-below", "mesh", "color_of", "colors[min(below + 1u, mesh_view.n_knots - 1u)]" => "colors[below]";
+    /// A colour map is continuous from the left at a jump.
+    MESH_COLOR_LEFT: "mesh-color-left", "mesh", "color_of", "colors[middle].w <= value" => "colors[middle].w < value";
     /// The depth instead of the distance.
     MESH_DEPTH: "mesh-depth", "mesh", "paint", "depth * length(ray.direction)" => "depth";
+    /// Lengths are in world units.
+    MESH_UNIT: "mesh-unit", "mesh", "paint", "length(ray.direction) * mesh_view.unit" => "length(ray.direction)";
     /// The normal of the first corner.
     MESH_NORMAL_OF_CORNER: "mesh-normal-of-corner", "mesh", "normal_of", "mixed(seen, seen.a.normal, seen.b.normal, seen.c.normal).xyz"
         => "seen.a.normal.xyz";
@@ -310,10 +314,12 @@ mutants! {
     CELLS_WRONG_FACE: "cells-wrong-face", "cells", "leave", "exit.triangle ^ 2u" => "exit.triangle ^ 3u";
     /// Left-handed cells are taken for right-handed ones.
     CELLS_HANDEDNESS: "cells-handedness", "cells", "handedness", "frame.voxel_world.y" => "1.0";
+    /// Two cells do not agree on which side a line through their edge passes it.
+    CELLS_TIES: "cells-ties", "cells", "side", "select(turn, sign(p.y - q.y), turn == 0)" => "select(turn, 2 * i32(a & 1u) - 1, turn == 0)";
     /// Cells that are left out are walked through.
     CELLS_VOIDS: "cells-voids", "cells", "is_void", "((voids[number >> 5u] >> (number & 31u)) & 1u) == 1u" => "voids[0] == 12345u";
     /// Rays do not end at surfaces.
-    CELLS_SURFACE: "cells-surface", "cells", "march_cells", "end = ray.eye + surface.w / unit_world();" => "end = FAR;";
+    CELLS_SURFACE: "cells-surface", "cells", "march_cells", "end = surface.w - ray.phase;" => "end = FAR;";
     /// Cells behind the eye are seen.
     CELLS_EYE: "cells-eye", "cells", "through_cells", "var reached = ray.eye;" => "var reached = -FAR;";
     /// Opacity is the depth.

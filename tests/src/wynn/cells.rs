@@ -17,7 +17,6 @@ use brickfield_core::{Aabb, Camera, Image, StructuredGrid, ValueRange};
 use serde::Serialize;
 
 use super::WynnArgs;
-use super::data::range_of;
 use crate::compare::rivals::Rivals;
 use crate::memory::cpu_seconds;
 use crate::metrics::{greatest_difference, median};
@@ -162,9 +161,7 @@ impl Subject {
         options.solution = Some(files.values);
         let grid = open_grid(&files.grid, &options)?.grids.swap_remove(0);
         let cells = Arc::new(Cells::of_grid(&grid, 0)?);
-        let range = range_of(&grid.fields()[0].values);
-        let of = |position: [f32; 3]| cells.center() + DVec3::from(position.map(f64::from));
-        let around = Aabb::of_points(cells.nodes().iter().map(|node| of(node.position)));
+        let (range, around) = (cells.range(), cells.extent());
         Ok(Subject { name: files.name, vtk: files.vtk, grid, range, around, cells })
     }
 
@@ -212,7 +209,7 @@ impl Subject {
         Ok((image, row))
     }
 
-    /// The planes in the middle of the grid along i and k, with their outlines.
+    /// The planes at a third of the grid along i and k, with their outlines.
     fn planes(&self, camera: Camera) -> Result<MeshPlan, PaperError> {
         let n = self.grid.n_nodes();
         let planes = [GridPlane::I(n.x / 3), GridPlane::K(n.z / 3)];

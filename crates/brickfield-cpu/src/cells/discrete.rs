@@ -16,7 +16,7 @@ pub struct DiscreteCells {
     /// Linear, premultiplied RGBA.
     pub image: Image<f64>,
     /// For each pixel, rows from the top: the most by which a channel changes when the ray is moved by [`SHIFT`](Self::SHIFT) of the cells'
-    /// radius, to four sides and along itself. Rays that graze faces, edges or the outline of the cells have it large.
+    /// radius, to eight sides and along itself: each backend has its own way past edges. Rays that graze faces, edges or the outline of the cells have it large.
     pub ambiguity: Vec<f64>,
     /// Nodes of all segments.
     pub n_samples: u64,
@@ -78,7 +78,9 @@ impl<'a> Reference<'a> {
         let shift = DiscreteCells::SHIFT * self.plan.cells().radius();
         let right = ray.direction.any_orthonormal_vector();
         let up = ray.direction.cross(right);
-        for (side, along) in [(right, 1.0), (-right, -1.0), (up, -1.0), (-up, 1.0)] {
+        let sides = [(right, 1.0), (-right, -1.0), (up, -1.0), (-up, 1.0)];
+        let corners = [right + up, right - up, -right + up, -right - up].map(|corner| (corner, 0.0));
+        for (side, along) in sides.into_iter().chain(corners) {
             let moved = ViewRay { anchor: ray.anchor + (side + ray.direction * along) * shift, ..ray };
             let other = self.along(&moved, end);
             let difference = pixel.rgba.iter().zip(other.rgba).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -96,7 +98,10 @@ impl<'a> Reference<'a> {
         let origin = ray.anchor + ray.direction * (t_start - ray.t_anchor);
         let walk =
             self.walker.as_ref().and_then(|w| Some((w, w.walk(&Ray { origin, direction: ray.direction }).ok()?)));
-        let Some((walker, walk)) = walk else { return pixel };
+        let Some((walker, walk)) = walk else {
+            pixel.rgba = over(&state, end.map(|(color, _)| color));
+            return pixel;
+        };
         let shifted = walk.map(|s| CellSegment { t_in: s.t_in + t_start, t_out: s.t_out + t_start, ..s });
         let cells: Vec<CellSegment> = shifted.collect();
         for run in cells.chunk_by(|a, b| a.run == b.run) {

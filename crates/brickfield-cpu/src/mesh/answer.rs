@@ -18,7 +18,7 @@ use super::{Hit, Rows};
 pub struct MeshAnswer {
     /// Linear red, green and blue, and the distance from the eye in units of [`MeshPlan::reach`]; 0 where there is nothing.
     pub pixels: Image<f64>,
-    /// How far each pixel may be from that, in every channel, by another triangle or by roundings of values and lines.
+    /// How far each pixel may be from that, in every channel, by another triangle or by roundings of values.
     pub ambiguity: Vec<f64>,
 }
 

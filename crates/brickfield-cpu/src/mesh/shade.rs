@@ -37,18 +37,26 @@ impl<'a> Shader<'a> {
                 [0, 1, 2].map(|channel| mixed(of_corners.map(|c| c[channel]), weights))
             }
         };
-        let color = self.plan.light().map_or(color, |light| self.lit(light, corners, position, weights, color));
+        let lit = |light| self.lit(light, corners, position, weights, color);
+        let (color, factor) = self.plan.light().map_or((color, 1.0), lit);
         let rounding = value_rounding(values);
         let rounding = match self.plan.coloring() {
-            Coloring::Values => change_around(colors, value, rounding),
+            Coloring::Values => factor * change_around(colors, value, rounding),
             // Corners' values are known exactly, and a jump among them is not one of their values.
             Coloring::Gouraud => 0.0,
         };
         ShadedColor { color: self.with_lines(corners, position, color), rounding }
     }
 
-    /// The colour in the light that falls on the side of the eye.
-    fn lit(&self, light: &Light, corners: &Corners, position: DVec2, weights: [f64; 3], color: LinearRgb) -> LinearRgb {
+    /// The colour in the light that falls on the side of the eye, and what it was multiplied by.
+    fn lit(
+        &self,
+        light: &Light,
+        corners: &Corners,
+        position: DVec2,
+        weights: [f64; 3],
+        color: LinearRgb,
+    ) -> (LinearRgb, f64) {
         let ray = self.plan.rays().at(position);
         let point: DVec3 = corners.positions.iter().zip(weights).map(|(p, w)| *p * w).sum();
         let normal = self.normal(corners, weights);
@@ -57,7 +65,7 @@ impl<'a> Shader<'a> {
         let to_light = self.plan.to_light(light, point, to_eye);
         // A gradient is far steeper than the least of a surface, and leads away from the eye.
         let shade = light.shade(normal * (-1e12 * light.flat_below()), to_light, to_eye);
-        color.map(|c| c * shade.factor + shade.highlight)
+        (color.map(|c| c * shade.factor + shade.highlight), shade.factor)
     }
 
     /// Of length 1, or 0.
@@ -65,13 +73,15 @@ impl<'a> Shader<'a> {
         if self.plan.shading().has_normals {
             let of = |v: u32| DVec3::from(self.plan.mesh().vertices()[v as usize].normal.map(f64::from));
             let sum: DVec3 = corners.vertices.iter().zip(weights).map(|(v, w)| of(*v) * w).sum();
-            return sum.normalize_or_zero();
+            if sum != DVec3::ZERO {
+                return sum.normalize_or_zero();
+            }
         }
         let [a, b, c] = corners.positions;
         (b - a).cross(c - a).normalize_or_zero()
     }
 
-    /// Mesh lines over a colour: whole within half their width of an edge, and nothing a pixel further.
+    /// Mesh lines over a colour: half of it at half their width from an edge, whole half a pixel before, and nothing half a pixel further.
     fn with_lines(&self, corners: &Corners, position: DVec2, color: LinearRgb) -> LinearRgb {
         let Some(lines) = self.plan.lines() else { return color };
         let edges = self.plan.mesh().triangles()[corners.triangle as usize].edges;

@@ -1,7 +1,7 @@
 //! The nodes of curvilinear cells, as shaders read them.
 
 use brickfield_core::glam::{DVec3, UVec3, Vec3};
-use brickfield_core::{Aabb, StructuredGrid};
+use brickfield_core::{Aabb, StructuredGrid, ValueRange};
 use bytemuck::{Pod, Zeroable};
 
 use super::boundary::{Boundary, CellFace, FaceBox, signed_volume};
@@ -15,8 +15,8 @@ use crate::content::Pages;
 #[derive(Clone, Debug)]
 pub struct Cells {
     n_cells: UVec3,
-    center: DVec3,
-    radius: f64,
+    extent: Aabb,
+    range: ValueRange,
     nodes: Vec<CellNode>,
     /// A bit for each cell; no words if there is no hole.
     voids: Vec<u32>,
@@ -55,10 +55,14 @@ pub enum CellsError {
     Count { what: &'static str, n: usize, n_nodes: usize },
     #[error("node ({}, {}, {}) lies at {position}; it must be finite", node.x, node.y, node.z)]
     Position { node: UVec3, position: DVec3 },
-    #[error("node ({}, {}, {}) has the value {value}; it must be finite", node.x, node.y, node.z)]
+    #[error("node ({}, {}, {}) has the value {value}; it must be finite, and at most {} from 0", node.x, node.y, node.z, Cells::MAX_VALUE)]
     Value { node: UVec3, value: f32 },
-    #[error("cells that reach {radius} from their centre; at most {} is possible", Cells::MAX_RADIUS)]
-    Far { radius: f64 },
+    #[error(
+        "cells that reach {radius} from their centre; from {} to {} is possible",
+        Cells::MIN_RADIUS,
+        Cells::MAX_RADIUS
+    )]
+    Radius { radius: f64 },
     #[error("the cells have a volume of {volume}; they must not be flat, nor all be holes")]
     Flat { volume: f64 },
     #[error("field {field} of a grid with {n_fields}")]
@@ -72,8 +76,12 @@ impl Cells {
     /// The most cells, and nearly the most nodes: a number and a face take 31 bits.
     pub const MAX: u64 = 1 << 28;
 
-    /// The greatest distance of a node from the centre, in world units.
+    /// The greatest distance of a node from the centre, in world units, is at most this,
     pub const MAX_RADIUS: f64 = 1e30;
+    /// and at least this.
+    pub const MIN_RADIUS: f64 = 1e-30;
+    /// The greatest value, and the least below 0.
+    pub const MAX_VALUE: f32 = 1e30;
 
     /// The cells between nodes, of positions in the world and values. A cell that touches a hole is left out.
     ///
@@ -81,7 +89,7 @@ impl Cells {
     ///
     /// # Errors
     /// No cells, or too many; not one position, value (and mark of a hole) for each node; of a node that is used, a number that is not
-    /// finite; cells without volume.
+    /// finite, or a value beyond [`MAX_VALUE`](Self::MAX_VALUE); cells without volume, too small or too large.
     pub fn new(
         n_cells: UVec3,
         positions: &[DVec3],
@@ -100,12 +108,13 @@ impl Cells {
         }
         let voids = holes.map_or(Vec::new(), |holes| voids(n_cells, holes));
         let is_used = used(n_cells, &voids);
-        let (center, radius) = extent(n_cells, positions, values, &is_used)?;
+        let around = extent(n_cells, positions, values, &is_used)?;
+        let center = around.0.center();
         let node = |i: usize| match is_used[i] {
             true => CellNode { position: (positions[i] - center).as_vec3().to_array(), value: values[i] },
             false => CellNode::default(),
         };
-        Cells::of_nodes(n_cells, (center, radius), (0..n_nodes).map(node).collect(), voids)
+        Cells::of_nodes(n_cells, around, (0..n_nodes).map(node).collect(), voids)
     }
 
     /// The cells of a structured grid, with the values of one of its fields.
@@ -126,7 +135,7 @@ impl Cells {
 
     fn of_nodes(
         n_cells: UVec3,
-        (center, radius): (DVec3, f64),
+        (extent, range): (Aabb, ValueRange),
         nodes: Vec<CellNode>,
         voids: Vec<u32>,
     ) -> Result<Cells, CellsError> {
@@ -138,8 +147,8 @@ impl Cells {
         }
         Ok(Cells {
             n_cells,
-            center,
-            radius,
+            extent,
+            range,
             boundary,
             handedness: if volume > 0.0 { Handedness::Right } else { Handedness::Left },
             node_table: Pages::of(bytemuck::cast_slice(&nodes), PAGE_BYTES),
@@ -156,12 +165,22 @@ impl Cells {
 
     /// The middle of the box around all nodes that are used, in the world.
     pub fn center(&self) -> DVec3 {
-        self.center
+        self.extent.center()
+    }
+
+    /// The box around all nodes that are used, in the world.
+    pub fn extent(&self) -> Aabb {
+        self.extent
+    }
+
+    /// The values of the nodes that are used.
+    pub fn range(&self) -> ValueRange {
+        self.range
     }
 
     /// No node is farther from the centre.
     pub fn radius(&self) -> f64 {
-        self.radius
+        0.5 * self.extent.diagonal()
     }
 
     /// All nodes.
@@ -227,7 +246,7 @@ fn is_set(words: &[u32], bit: usize) -> bool {
     words.get(bit / 32).is_some_and(|word| word >> (bit % 32) & 1 == 1)
 }
 
-/// The number of the first node of a cell, and how far its eight corners are from it.
+/// The numbers of a cell's corners.
 pub(super) fn corners(n_cells: UVec3, cell: usize) -> [usize; 8] {
     let [nx, ny, _] = n_cells.to_array().map(|n| n as usize);
     let (x, y, z) = (cell % nx, cell / nx % ny, cell / nx / ny);
@@ -259,8 +278,13 @@ fn used(n_cells: UVec3, voids: &[u32]) -> Vec<bool> {
     used
 }
 
-/// Centre and radius of the nodes that are used.
-fn extent(n_cells: UVec3, positions: &[DVec3], values: &[f32], is_used: &[bool]) -> Result<(DVec3, f64), CellsError> {
+/// The box around the nodes that are used, and the range of their values.
+fn extent(
+    n_cells: UVec3,
+    positions: &[DVec3],
+    values: &[f32],
+    is_used: &[bool],
+) -> Result<(Aabb, ValueRange), CellsError> {
     let named = |i: usize| {
         let [nx, ny, _] = n_cells.to_array().map(|n| n as usize + 1);
         UVec3::new((i % nx) as u32, (i / nx % ny) as u32, (i / nx / ny) as u32)
@@ -269,15 +293,22 @@ fn extent(n_cells: UVec3, positions: &[DVec3], values: &[f32], is_used: &[bool])
     if let Some(i) = all().find(|i| !positions[*i].is_finite()) {
         return Err(CellsError::Position { node: named(i), position: positions[i] });
     }
-    if let Some(i) = all().find(|i| !values[*i].is_finite()) {
+    let is_good = |value: f32| value.abs() <= Cells::MAX_VALUE;
+    if let Some(i) = all().find(|i| !is_good(values[*i])) {
         return Err(CellsError::Value { node: named(i), value: values[i] });
     }
     let around = Aabb::of_points(all().map(|i| positions[i]));
     if around.min.x > around.max.x {
         return Err(CellsError::Flat { volume: 0.0 });
     }
-    let (center, radius) = (around.center(), 0.5 * around.diagonal());
-    if radius <= Cells::MAX_RADIUS { Ok((center, radius)) } else { Err(CellsError::Far { radius }) }
+    let radius = 0.5 * around.diagonal();
+    // Cells in one point have no volume, which is said below.
+    if !(radius <= Cells::MAX_RADIUS && (radius == 0.0 || radius >= Cells::MIN_RADIUS)) {
+        return Err(CellsError::Radius { radius });
+    }
+    let used = || all().map(|i| f64::from(values[i]));
+    let (min, max) = (used().fold(f64::INFINITY, f64::min), used().fold(f64::NEG_INFINITY, f64::max));
+    Ok((around, ValueRange { min, max }))
 }
 
 #[cfg(test)]
@@ -311,6 +342,7 @@ mod tests {
         assert_eq!((0..8).filter(|cell| cells.is_void(*cell)).collect::<Vec<_>>(), [0]);
         assert_eq!(cells.voids(), [1]);
         assert_eq!(cells.nodes()[0], CellNode::default());
+        assert_eq!(cells.range(), ValueRange { min: 1.0, max: 26.0 });
         assert_eq!(cells.faces().len(), 24);
     }
 
@@ -334,6 +366,7 @@ mod tests {
         assert!(error(&flat, &[0.0; 8]).starts_with("the cells have a volume of 0"));
         assert_eq!(error(&flat, &[0.0; 7]), "7 values for 8 nodes");
         assert!(error(&flat, &[f32::NAN; 8]).starts_with("node (0, 0, 0) has the value NaN"));
+        assert!(error(&flat, &[2e30; 8]).contains("at most 1000000000000000000000000000000 from 0"));
         assert!(error(&[DVec3::INFINITY; 8], &[0.0; 8]).starts_with("node (0, 0, 0) lies at"));
     }
 }

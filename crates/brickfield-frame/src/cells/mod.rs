@@ -6,7 +6,7 @@ mod data;
 use std::sync::Arc;
 
 use brickfield_core::glam::UVec2;
-use brickfield_core::{Camera, Image, TransferFunction};
+use brickfield_core::{Camera, Image, TransferFunction, ValueRange};
 
 use crate::{Decode, Division, Frame, Lengths, RenderError, Sampling, ValueScale, ViewRays};
 
@@ -127,14 +127,29 @@ impl CellsPlan {
 
     /// How f32 arithmetic counts data values.
     pub fn value_scale(&self) -> ValueScale {
-        let values = || self.cells.nodes().iter().map(|node| f64::from(node.value));
-        let (min, max) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+        let ValueRange { min, max } = self.cells.range();
         ValueScale::of(&self.transfer, Decode { scale: max - min, offset: min })
     }
 
     /// A power of two near the cells' radius, in world units: with lengths in this unit, products of them stay within f32.
     pub fn unit(&self) -> f64 {
         2f64.powi(self.cells.radius().log2().ceil() as i32)
+    }
+
+    /// A whole number of steps before the nearest cell, as a distance from the eye: shaders count distances from there.
+    pub(crate) fn start(&self) -> f64 {
+        let (step, nearest) = (self.sampling.step_world(), (self.rays.eye().length() - self.cells.radius()).max(0.0));
+        (nearest / step).floor() * step
+    }
+
+    /// Where rays end, as shaders read it: the surface's colour, and its distance from [`start`](Self::start) in [`unit`](Self::unit)s, 0 where
+    /// there is none.
+    pub(crate) fn ends(&self) -> Option<Vec<[f32; 4]>> {
+        let (start, unit) = (self.start(), self.unit());
+        // A surface before all cells ends rays before them.
+        let past = |t: f32| (((f64::from(t) - start) / unit) as f32).max(f32::MIN_POSITIVE);
+        let end = |[r, g, b, t]: &[f32; 4]| if *t > 0.0 { [*r, *g, *b, past(*t)] } else { [0.0; 4] };
+        Some(self.behind.as_deref()?.pixels().iter().map(end).collect())
     }
 
     /// The choices that are compiled into its shader.

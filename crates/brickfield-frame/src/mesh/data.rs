@@ -12,6 +12,7 @@ use crate::content::Pages;
 pub struct Mesh {
     center: DVec3,
     radius: f64,
+    unit: f64,
     vertices: Vec<MeshVertex>,
     triangles: Vec<MeshTriangle>,
     has_normals: bool,
@@ -23,7 +24,7 @@ pub struct Mesh {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct MeshVertex {
-    /// Relative to the mesh's centre, in world units.
+    /// Relative to the mesh's centre, in units of [`Mesh::unit`].
     pub position: [f32; 3],
     /// The data value.
     pub value: f32,
@@ -54,21 +55,28 @@ pub enum MeshError {
     NotFinite { what: &'static str, vertex: usize, value: DVec3 },
     #[error("triangle {triangle} has the corner {corner}, but there are {n_vertices} vertices")]
     Corner { triangle: usize, corner: u32, n_vertices: usize },
+    #[error("a mesh that reaches {radius} from its centre; at most {} is possible", Mesh::MAX_RADIUS)]
+    Far { radius: f64 },
     #[error("a mesh of {n} {what}; at most {} are possible", Mesh::MAX)]
     TooMany { what: &'static str, n: usize },
 }
 
 /// Bytes of vertices or triangles that are brought together.
 const PAGE_BYTES: usize = 1 << 18;
+/// Smaller meshes are drawn in this unit, about.
+const LEAST_UNIT: f64 = 1e-30;
 
 impl Mesh {
     /// The most vertices, and the most triangles.
     pub const MAX: usize = 1 << 28;
 
+    /// The greatest distance of a vertex from the centre, in world units.
+    pub const MAX_RADIUS: f64 = 1e30;
+
     /// The mesh of positions in the world, values, and triangles. Without `normals` triangles are lit as planes.
     ///
     /// # Errors
-    /// Not one value (and normal) for each position; numbers that are not finite; triangles without corners; too many.
+    /// Not one value (and normal) for each position; numbers that are not finite; triangles without corners; too many, or too far apart.
     pub fn new(
         positions: &[DVec3],
         values: &[f32],
@@ -82,9 +90,13 @@ impl Mesh {
                 .iter()
                 .fold(Aabb { min: *first, max: *first }, |b, p| Aabb { min: b.min.min(*p), max: b.max.max(*p) });
         }
-        let center = extent.center();
+        let (center, radius) = (extent.center(), 0.5 * extent.diagonal());
+        if !(radius <= Mesh::MAX_RADIUS) {
+            return Err(MeshError::Far { radius });
+        }
+        let unit = if radius > 0.0 { 2f64.powi(radius.max(LEAST_UNIT).log2().ceil() as i32) } else { 1.0 };
         let vertex = |i: usize| MeshVertex {
-            position: (positions[i] - center).as_vec3().to_array(),
+            position: ((positions[i] - center) / unit).as_vec3().to_array(),
             value: values[i],
             normal: normals.map_or([0.0; 3], |n| n[i].as_vec3().to_array()),
             padding: 0.0,
@@ -92,7 +104,8 @@ impl Mesh {
         let vertices: Vec<MeshVertex> = (0..positions.len()).map(vertex).collect();
         Ok(Mesh {
             center,
-            radius: 0.5 * extent.diagonal(),
+            radius,
+            unit,
             has_normals: normals.is_some(),
             vertex_table: Pages::of(bytemuck::cast_slice(&vertices), PAGE_BYTES),
             triangle_table: Pages::of(bytemuck::cast_slice(&triangles), PAGE_BYTES),
@@ -111,6 +124,11 @@ impl Mesh {
         self.radius
     }
 
+    /// A power of two near the radius, in world units: with lengths in this unit, products of them stay within f32.
+    pub fn unit(&self) -> f64 {
+        self.unit
+    }
+
     /// The vertices.
     pub fn vertices(&self) -> &[MeshVertex] {
         &self.vertices
@@ -126,11 +144,11 @@ impl Mesh {
         self.has_normals
     }
 
-    /// The position of a vertex relative to the centre, as it is drawn.
+    /// The position of a vertex relative to the centre, as it is drawn, in world units.
     #[inline]
     pub fn position(&self, vertex: u32) -> DVec3 {
         let [x, y, z] = self.vertices[vertex as usize].position;
-        DVec3::new(x.into(), y.into(), z.into())
+        DVec3::new(x.into(), y.into(), z.into()) * self.unit
     }
 
     /// The vertices as a device holds them.
@@ -168,7 +186,8 @@ fn check(
     if let Some(i) = values.iter().position(|v| !v.is_finite()) {
         return not_finite("value", i, DVec3::splat(values[i].into()));
     }
-    if let Some((i, n)) = normals.and_then(|normals| normals.iter().enumerate().find(|(_, n)| !n.is_finite())) {
+    if let Some((i, n)) = normals.and_then(|normals| normals.iter().enumerate().find(|(_, n)| !n.as_vec3().is_finite()))
+    {
         return not_finite("normal", i, *n);
     }
     let beyond = |t: &MeshTriangle| t.corners.into_iter().find(|corner| *corner as usize >= n_vertices);
@@ -208,6 +227,8 @@ mod tests {
         assert_eq!(error(&[0.0; 2], None, [0, 1, 2]), "2 values for 3 vertices");
         assert_eq!(error(&[0.0; 3], Some(&[DVec3::X]), [0, 1, 2]), "1 normals for 3 vertices");
         assert!(error(&[0.0, f32::NAN, 0.0], None, [0, 1, 2]).starts_with("vertex 1 has the value"));
+        let far = Mesh::new(&CORNERS.map(|p| p * 1e39), &[0.0; 3], None, Vec::new()).unwrap_err();
+        assert!(far.to_string().starts_with("a mesh that reaches"));
         assert_eq!(error(&[0.0; 3], None, [0, 1, 3]), "triangle 0 has the corner 3, but there are 3 vertices");
     }
 }

@@ -60,7 +60,8 @@ pub struct MeshView {
     pub colors: TransferFunction,
     /// How colours come about between corners.
     pub coloring: Coloring,
-    /// The light on the mesh, from both of its sides; `None`: colours as they are.
+    /// The light on the mesh, from both of its sides; `None`: colours as they are. Only its source and
+    /// terms count.
     pub light: Option<Light>,
     /// Lines along marked edges.
     pub lines: Option<MeshLines>,
@@ -73,8 +74,12 @@ pub struct MeshView {
 pub enum MeshPlanError {
     #[error("mesh lines of {width} pixels; they must be more than 0 and at most {}", MeshLines::MAX_WIDTH)]
     LineWidth { width: f64 },
+    #[error("mesh lines of the colour {color:?}; its parts must be finite, and 0 or more")]
+    LineColor { color: LinearRgb },
     #[error("a picture of {} x {} pixels; it needs at least one", size.x, size.y)]
     Size { size: UVec2 },
+    #[error("a mesh that reaches {reach} from the eye; at most {most} is possible")]
+    Far { reach: f64, most: f64 },
 }
 
 impl MeshLines {
@@ -84,12 +89,14 @@ impl MeshLines {
 
 /// Nothing is drawn nearer to the eye's plane than this share of the scene.
 const NEAR: f64 = 1e-6;
+/// The greatest distance from the eye, in world units and in units of the mesh: those of f32, and room for products.
+const MOST_REACH: f64 = 1e30;
 
 impl MeshPlan {
     /// The plan of a mesh's picture.
     ///
     /// # Errors
-    /// No pixels; lines too narrow or too wide.
+    /// No pixels; lines too narrow or too wide, or of no colour; an eye too far away.
     pub fn new(mesh: Arc<Mesh>, view: MeshView) -> Result<MeshPlan, MeshPlanError> {
         let MeshView { camera, size, colors, coloring, light, lines } = view;
         if size.min_element() == 0 {
@@ -100,8 +107,19 @@ impl MeshPlan {
         {
             return Err(MeshPlanError::LineWidth { width });
         }
+        if let Some(MeshLines { color, .. }) = lines
+            && !color.iter().all(|c| c.is_finite() && *c >= 0.0)
+        {
+            return Err(MeshPlanError::LineColor { color });
+        }
         let rays = ViewRays::new(&camera, size, mesh.center(), mesh.radius());
-        let near = if rays.are_parallel() { 0.0 } else { NEAR * (mesh.radius() + rays.anchor[0].length()) };
+        let (reach, most) = (rays.eye().length() + mesh.radius(), MOST_REACH * mesh.unit().min(1.0));
+        if !(reach <= most) {
+            return Err(MeshPlanError::Far { reach, most });
+        }
+        // Sides, and the gradient of a surface, are of volumes.
+        let light = light.map(|l| Light::new(l.source(), l.terms(), 1.0).expect("terms that are a light's"));
+        let near = NEAR * (mesh.radius() + rays.anchor[0].length());
         Ok(MeshPlan { mesh, rays, colors, coloring, light, lines, near })
     }
 
@@ -135,7 +153,7 @@ impl MeshPlan {
         self.lines.as_ref()
     }
 
-    /// The depth from which on something is drawn: 0 of parallel rays.
+    /// The depth from which on something is drawn.
     pub fn near(&self) -> f64 {
         self.near
     }

@@ -6,7 +6,8 @@ use bytemuck::{Pod, Zeroable};
 
 use super::MeshPlan;
 
-/// The uniform block of a mesh's picture. Positions are relative to the mesh's centre, in world units; the layout is held against
+/// The uniform block of a mesh's picture. Positions are relative to the mesh's centre, and lengths in units of
+/// [`Mesh::unit`](super::Mesh::unit); the layout is held against
 /// naga's by a test of `brickfield-shaders`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -39,8 +40,10 @@ pub struct MeshUniforms {
     pub n_knots: u32,
     /// The exponent of highlights.
     pub shininess: u32,
+    /// The unit of lengths, in world units.
+    pub unit: f32,
     /// Nothing.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }
 
 fn row(v: DVec3, w: f64) -> [f32; 4] {
@@ -50,9 +53,10 @@ fn row(v: DVec3, w: f64) -> [f32; 4] {
 impl MeshUniforms {
     /// The numbers of a plan.
     pub fn of(plan: &MeshPlan) -> MeshUniforms {
-        let rays = &plan.rays;
+        let (rays, unit) = (&plan.rays, plan.mesh.unit());
         let half = 0.5 * rays.size.as_dvec2();
         let [clip_x, clip_y, clip_z, clip_w] = clip(plan);
+        let anchor = rays.anchor.map(|a| a / unit);
         let (light, line) = (plan.light.as_ref(), plan.lines.as_ref());
         let terms = light.map(|light| light.terms()).unwrap_or_default();
         MeshUniforms {
@@ -60,9 +64,9 @@ impl MeshUniforms {
             clip_y,
             clip_z,
             clip_w,
-            anchor: row(rays.anchor[0], rays.anchor_depth),
-            anchor_right: row(rays.anchor[1], half.x),
-            anchor_down: row(rays.anchor[2], half.y),
+            anchor: row(anchor[0], rays.anchor_depth / unit),
+            anchor_right: row(anchor[1], half.x),
+            anchor_down: row(anchor[2], half.y),
             direction: row(rays.direction[0], line.map_or(0.0, |line| 0.5 * line.width)),
             direction_right: row(rays.direction[1], terms.ambient),
             direction_down: row(rays.direction[2], terms.diffuse),
@@ -70,11 +74,14 @@ impl MeshUniforms {
             source: match light.map(|light| light.source()) {
                 None | Some(LightSource::Head) => row(DVec3::ZERO, -1.0),
                 Some(LightSource::Direction(direction)) => row(direction, 0.0),
-                Some(LightSource::Place(place)) => row(place - plan.mesh.center(), 1.0),
+                Some(LightSource::Place(place)) => {
+                    row(((place - plan.mesh.center()) / unit).clamp_length_max(FAR_LIGHT), 1.0)
+                }
             },
             n_knots: plan.colors.knots().len() as u32,
             shininess: terms.shininess,
-            padding: [0; 2],
+            unit: unit as f32,
+            padding: 0,
         }
     }
 }
@@ -85,23 +92,37 @@ fn clip(plan: &MeshPlan) -> [[f32; 4]; 4] {
     let rays = &plan.rays;
     let half = 0.5 * rays.size.as_dvec2();
     let eye = rays.eye();
+    let unit = plan.mesh.unit();
+    // Of parallel rays clip space is the picture itself; else all of it may be divided by the unit.
+    let (position, constant) = if rays.are_parallel() { (unit, 1.0) } else { (1.0, 1.0 / unit) };
     let across = |axis: DVec3, scale: f64| {
         let axis = axis / axis.length_squared() * scale;
-        row(axis, -axis.dot(eye))
+        row(axis * position, -axis.dot(eye) * constant)
     };
     let (x, y) = (across(rays.pixel[0], 1.0 / half.x), across(rays.pixel[1], -1.0 / half.y));
     let [forward, ..] = rays.direction;
     if !rays.are_parallel() {
-        return [x, y, row(DVec3::ZERO, plan.near), row(forward, -forward.dot(eye))];
+        return [x, y, row(DVec3::ZERO, plan.near / unit), row(forward, -forward.dot(eye) / unit)];
     }
     let reach = plan.mesh.radius().max(f64::MIN_POSITIVE) * 1.01;
-    let nearest = (-reach).max(-rays.anchor_depth);
-    let thickness = (reach - nearest).max(f64::MIN_POSITIVE);
-    [x, y, row(-forward / thickness, reach / thickness), row(DVec3::ZERO, 1.0)]
+    let nearest = (-reach).max(plan.near - rays.anchor_depth);
+    // A mesh behind the eye's plane is farther than the nearest, at a finite depth.
+    let thickness = (reach - nearest).max(1e-3 * reach);
+    let farthest = if reach > nearest { reach } else { nearest + thickness };
+    [x, y, row(-forward * (unit / thickness), farthest / thickness), row(DVec3::ZERO, 1.0)]
 }
 
-/// A knot of the colour map as shaders read it: red, green, blue, and its value.
+/// A place of light farther away, in units of the mesh, is taken for one in the same direction: its square stays within f32.
+const FAR_LIGHT: f64 = 1e12;
+
+/// A knot of the colour map as shaders read it: red, green, blue, and its value. That is rounded up, so that the same values of f32 are
+/// at or above it.
 pub(crate) fn color_knots(plan: &MeshPlan) -> Vec<[f32; 4]> {
-    let knot = |k: &brickfield_core::Knot| row(DVec3::from_array(k.color), k.value);
+    let rounded_up = |value: f64| match value as f32 {
+        nearest if f64::from(nearest) < value => nearest.next_up(),
+        nearest => nearest,
+    };
+    let knot =
+        |k: &brickfield_core::Knot| [k.color[0] as f32, k.color[1] as f32, k.color[2] as f32, rounded_up(k.value)];
     plan.colors.knots().iter().map(knot).collect()
 }

@@ -40,4 +40,4 @@ pub use options::GridOptions;
 pub(crate) use vtk_fields::{add_array, n_field_bytes, positions};
 
 /// What the volume reader says of a structured grid.
-pub(crate) const OPENED_BY: &str = "it is a structured grid, which `open_grid` opens";
+pub(crate) const OPENED_BY: &str = "it is a structured grid, and no volume";

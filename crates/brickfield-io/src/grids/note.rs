@@ -29,7 +29,7 @@ impl fmt::Display for GridNote {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             GridNote::SolutionBeside { name } => {
-                write!(f, "{:?} beside it may have its values: state it as `GridOptions::solution`", one_line(name))
+                write!(f, "{:?} beside it may have its values: state it as the solution", one_line(name))
             }
             GridNote::SpareBytes { what, n_bytes } => {
                 write!(f, "{} of zeros follow the last number of {what}", bytes(n_bytes))

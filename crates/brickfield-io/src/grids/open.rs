@@ -61,7 +61,7 @@ fn detect(path: &Path) -> Result<GridFormat, ReadError> {
         return Ok(GridFormat::Plot3d);
     }
     match (Format::from_magic(&head), Format::from_extension(path)) {
-        (Some(volume), _) => Err(ReadError::unsupported("format", volume, "it is a volume, which `open` opens")),
+        (Some(volume), _) => Err(ReadError::unsupported("format", volume, "it is a volume, and no structured grid")),
         // Zeros may follow a PLOT3D file; its reader says more about one that is wrong.
         (None, Some(Format::Raw)) => Ok(GridFormat::Plot3d),
         (None, _) => Err(ReadError::UnknownGridFormat { found: Shown::of_bytes(&head) }),
@@ -98,7 +98,10 @@ fn open_with_solution(path: &Path, solution: &Path, options: &GridOptions) -> Re
     let file = buffered(path).map_err(|fault| OpenError::new(path, fault))?;
     let mut values: Box<dyn ByteSource> =
         Box::new(buffered(solution).map_err(|fault| OpenError::new(solution, fault))?);
-    plot3d::read(file, Some(&mut *values), options).map_err(|fault| OpenError::new(path, fault))
+    plot3d::read_both(file, &mut *values, options).map_err(|(of, fault)| match of {
+        plot3d::FileOf::Grid => OpenError::new(path, fault),
+        plot3d::FileOf::Solution => OpenError::new(solution, fault),
+    })
 }
 
 /// The name of a file beside a PLOT3D grid that is named as its solution would be: "combxyz.bin" and "combq.bin".

@@ -167,7 +167,7 @@ fn files_that_lie() {
         assert!(file.contains(from), "{from}");
         read(file.replace(from, to).as_bytes()).unwrap_err().to_string()
     };
-    let grid = "it is a structured grid, which `open_grid` opens";
+    let grid = "it is a structured grid, and no volume";
     for (dataset, hint) in [
         ("UNSTRUCTURED_GRID", "STRUCTURED_POINTS is"),
         ("POLYDATA", "STRUCTURED_POINTS is"),

@@ -30,9 +30,17 @@ pub fn positive(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "it must be a finite number above 0".to_owned())
 }
 
-/// A finite number.
-pub fn factor(text: &str) -> Result<f64, String> {
-    text.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| "it must be a finite number".to_owned())
+/// A factor by which heights are exaggerated.
+pub fn exaggeration(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse().ok().filter(|v: &f64| v.abs() <= 1e6);
+    number.ok_or_else(|| "it must be a number from -1000000 to 1000000".to_owned())
+}
+
+/// The width of mesh lines in pixels.
+pub fn line_width(text: &str) -> Result<f64, String> {
+    let most = brickfield_frame::MeshLines::MAX_WIDTH;
+    let number = text.trim().parse().ok().filter(|v: &f64| *v > 0.0 && *v <= most);
+    number.ok_or_else(|| format!("it must be a number above 0 and at most {most}"))
 }
 
 /// A plane of a structured grid.

@@ -19,6 +19,8 @@ const SIZE: UVec2 = UVec2::new(64, 48);
 #[derive(Clone, Copy)]
 enum Shape {
     Sheared,
+    /// Faces at odd multiples of 1/32, if there are 8 cells along each axis.
+    Cubes,
     /// Around an axis, at which cells are wedges.
     Polar,
     /// Faces are bent, no two edges are parallel.
@@ -86,6 +88,7 @@ impl CellsSetup {
         let q = p - 0.5;
         match self.shape {
             Shape::Sheared => DVec3::new(1.6 * q.x + 0.5 * q.y - 0.3 * q.z, 1.3 * q.y + 0.2 * q.z, 1.1 * q.z),
+            Shape::Cubes => 2.0 * q + 1.0 / 32.0,
             Shape::Polar => {
                 let (radius, angle) = (0.9 * p.x, 0.8 * TAU * p.y + 0.3);
                 DVec3::new(radius * angle.cos(), radius * angle.sin(), 1.4 * q.z + 0.1 * p.x)
@@ -172,15 +175,22 @@ pub(super) fn cases() -> Vec<Case> {
             ..of(Shape::Sheared)
         }
         .case("far-eye", catches![StepScaled]),
-        CellsSetup { mode: Mode::Fast { transmittance_floor: 1e-5 }, step: 0.01, ..of(Shape::Sheared) }
-            .case("fast", catches![KnotMoved]),
-        // Rays run along faces, edges and corners.
         CellsSetup {
-            projection: Projection::Orthographic { height: 2.0 },
-            eye: DVec3::new(0.0, -4.0, 0.0),
-            n_cells: UVec3::new(8, 8, 8),
+            eye: DVec3::new(1.3, -3.1, 2.2) * 1e4,
+            projection: Projection::Perspective { fov_y: 7e-5 },
+            has_surface: true,
             ..of(Shape::Sheared)
         }
-        .case("along-faces", catches![ValuesShifted]),
+        .case("far-surface", catches![SurfaceIgnored]),
+        CellsSetup { mode: Mode::Fast { transmittance_floor: 1e-5 }, step: 0.01, ..of(Shape::Sheared) }
+            .case("fast", catches![KnotMoved]),
+        // Pixels are 1/16 apart: every fourth column and row of rays runs along faces, and where both do, along edges.
+        CellsSetup {
+            projection: Projection::Orthographic { height: 3.0 },
+            eye: DVec3::new(0.0, -4.0, 0.0),
+            n_cells: UVec3::new(8, 8, 8),
+            ..of(Shape::Cubes)
+        }
+        .case("along-faces", catches![ValuesShifted, shader::CELLS_TIES]),
     ]
 }

@@ -1,7 +1,7 @@
 //! Meshes: surfaces of curvilinear grids, in all ways of drawing them.
 
 use brickfield::SurfaceNormals;
-use brickfield::curvilinear::{BudgetSelector, QuadTree, Selection, View};
+use brickfield::curvilinear::{BudgetSelector, CurvilinearGrid, HeightField, Positions, QuadTree, Selection, View};
 use brickfield::frame::{Coloring, MeshLines, MeshView};
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Camera, Knot, Projection, TransferFunction};
@@ -32,6 +32,10 @@ struct MeshSetup {
     normals: SurfaceNormals,
     lines: Option<f64>,
     covers: Covers,
+    /// World units for a unit of all lengths here.
+    scale: f64,
+    /// Values are tenths, and colours have steps at some of them.
+    is_stepped: bool,
 }
 
 #[derive(Clone, Copy)]
@@ -59,25 +63,52 @@ impl MeshSetup {
             normals: SurfaceNormals::Triangles,
             lines: None,
             covers: Covers::Part,
+            scale: 1.0,
+            is_stepped: false,
         }
     }
 
     fn build(&self) -> MeshTest {
-        let grid = self.kind.grid(self.n_zones, self.center);
-        let tree = QuadTree::build(grid);
-        let target = self.center + self.target;
-        let camera = Camera::look_at(target + self.eye, target, DVec3::Y, self.projection).expect("a camera");
-        let light = self.light.map(|source| Light::new(source, terms(), 1.0).expect("a light"));
+        let tree = QuadTree::build(self.grid());
+        let target = (self.center + self.target) * self.scale;
+        let camera =
+            Camera::look_at(target + self.eye * self.scale, target, DVec3::Y, self.projection).expect("a camera");
+        let source = |source| match source {
+            LightSource::Place(place) => LightSource::Place(place * self.scale),
+            other => other,
+        };
+        let light = self.light.map(|light| Light::new(source(light), terms(), 1.0).expect("a light"));
         let view = MeshView {
             camera,
             size: self.size,
-            colors: colors(),
+            colors: if self.is_stepped { steps() } else { colors() },
             coloring: self.coloring,
             light,
             lines: self.lines.map(|width| MeshLines { width, color: [0.02, 0.02, 0.1] }),
         };
         let (grid, selection) = (tree.grid().clone(), self.select(tree, camera));
         MeshTest { grid, selection, view, normals: self.normals, covers: self.covers }
+    }
+
+    fn grid(&self) -> CurvilinearGrid {
+        let grid = self.kind.grid(self.n_zones, self.center);
+        let positions = match grid.positions() {
+            Positions::Heights(field) => Positions::Heights(HeightField {
+                origin: field.origin * self.scale,
+                along_column: field.along_column * self.scale,
+                along_row: field.along_row * self.scale,
+                along_value: field.along_value * self.scale,
+            }),
+            Positions::Curvilinear(positions) => {
+                Positions::Curvilinear(positions.iter().map(|p| *p * self.scale).collect())
+            }
+            other => other.clone(),
+        };
+        let value = |v: &f32| if self.is_stepped { (v * 10.0).round() / 10.0 } else { *v };
+        let values = grid.values().iter().map(value).collect();
+        let changed =
+            CurvilinearGrid::new(grid.n_rows(), grid.n_columns(), positions, values).expect("a grid of waves");
+        changed.with_ends(grid.ends()).expect("waves meet themselves")
     }
 
     fn select(&self, tree: QuadTree, camera: Camera) -> Selection {
@@ -117,6 +148,15 @@ fn colors() -> TransferFunction {
     TransferFunction::new(knots).expect("ascending knots")
 }
 
+/// Steps at values that corners have: at -0.4, which is none of f32, and at 0.5, which is.
+fn steps() -> TransferFunction {
+    let knot = |value: f64, color| Knot { value, extinction: 0.0, color };
+    let (blue, green, red) = ([0.05, 0.1, 0.8], [0.1, 0.7, 0.2], [0.8, 0.1, 0.1]);
+    let knots =
+        vec![knot(-1.2, blue), knot(-0.4, blue), knot(-0.4, green), knot(0.5, green), knot(0.5, red), knot(1.2, red)];
+    TransferFunction::new(knots).expect("ascending knots")
+}
+
 pub(super) fn cases() -> Vec<Case> {
     [drawn(), lit(), lined(), viewed(), watertight()].into_iter().flatten().collect()
 }
@@ -140,6 +180,8 @@ fn drawn() -> Vec<Case> {
         ),
         MeshSetup { coloring: Coloring::Gouraud, ..of(GridKind::Heights) }
             .case("gouraud", catches![OtherColoring, ValuesOffset]),
+        MeshSetup { coloring: Coloring::Gouraud, is_stepped: true, ..of(GridKind::Heights) }
+            .case("steps", catches![shader::MESH_COLOR_LEFT]),
         // Whatever is drawn is too much.
         MeshSetup { chosen: Chosen::Nothing, covers: Covers::Nothing, ..of(GridKind::Heights) }
             .case("nothing", catches![Ghost]),
@@ -161,6 +203,11 @@ fn lit() -> Vec<Case> {
         lit(GridKind::Heights, slant, grid)
             .case("slant-light", catches![LightTurned, shader::MESH_NORMAL_OF_CORNER, shader::MESH_HIGHLIGHT]),
         lit(GridKind::Torus, place, grid).case("light-beside", catches![LightTurned, shader::MESH_PLACE]),
+        // Squares of lengths are beyond f32.
+        MeshSetup { scale: 3e22, lines: Some(1.5), ..lit(GridKind::Torus, place, triangles) }
+            .case("large", catches![LightTurned, shader::MESH_UNIT]),
+        MeshSetup { scale: 3e-22, ..lit(GridKind::Heights, place, grid) }
+            .case("small", catches![LightTurned, shader::MESH_UNIT]),
         MeshSetup { eye: DVec3::new(0.5, 3.0, -4.0), ..lit(GridKind::Heights, slant, triangles) }
             .case("from-below", catches![shader::MESH_NORMAL_AWAY]),
     ]

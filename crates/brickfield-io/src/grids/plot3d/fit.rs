@@ -35,7 +35,11 @@ pub(super) fn find_grid(source: &mut dyn ByteSource, stated: &Plot3dLayout) -> R
         Err(several) if several.is_empty() => match find_only_values(source, length)? {
             Some(values) => {
                 let value = format!("{} of {}", values.layout.content.name(), grids(&values.sizes));
-                Err(ReadError::unsupported("PLOT3D file", value, "its grid is, with it as `solution`"))
+                Err(ReadError::unsupported(
+                    "PLOT3D file",
+                    value,
+                    "it is the solution of a grid: open that, with this file as its solution",
+                ))
             }
             None => Err(none_fits("length of the grid file", length, &candidates)),
         },

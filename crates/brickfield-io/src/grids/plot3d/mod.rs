@@ -49,25 +49,43 @@ pub fn read(
     solution: Option<&mut dyn ByteSource>,
     options: &GridOptions,
 ) -> Result<OpenedGrids, ReadError> {
-    read_from(&mut grid, solution, options)
+    read_from(&mut grid, solution, options).map_err(|(_, fault)| fault)
+}
+
+/// The file in which something is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FileOf {
+    Grid,
+    Solution,
+}
+
+/// [`read`] of a grid with its solution, and which of both is at fault.
+pub(crate) fn read_both(
+    mut grid: impl BufRead + Seek,
+    solution: &mut dyn ByteSource,
+    options: &GridOptions,
+) -> Result<OpenedGrids, (FileOf, ReadError)> {
+    read_from(&mut grid, Some(solution), options)
 }
 
 fn read_from(
     source: &mut dyn ByteSource,
     solution: Option<&mut dyn ByteSource>,
     options: &GridOptions,
-) -> Result<OpenedGrids, ReadError> {
-    let found = find_grid(source, &options.layout)?;
+) -> Result<OpenedGrids, (FileOf, ReadError)> {
+    let of_grid = |fault| (FileOf::Grid, fault);
+    let of_solution = |fault| (FileOf::Solution, fault);
+    let found = find_grid(source, &options.layout).map_err(of_grid)?;
     let values = match solution {
         None => None,
-        Some(source) => Some((find_values(source, &found, &options.layout)?, source)),
+        Some(source) => Some((find_values(source, &found, &options.layout).map_err(of_solution)?, source)),
     };
     let n_fields = values.as_ref().map_or(0, |(found, _)| n_fields(found));
-    check_nodes(&found.sizes.grids, NODE_BYTES + 4 * u128::from(n_fields), 0, &options.limits)?;
-    let mut opened = OpenedGrids::new(read_grids(source, &found)?, GridFormat::Plot3d);
+    check_nodes(&found.sizes.grids, NODE_BYTES + 4 * u128::from(n_fields), 0, &options.limits).map_err(of_grid)?;
+    let mut opened = OpenedGrids::new(read_grids(source, &found).map_err(of_grid)?, GridFormat::Plot3d);
     note_spare("the grid", &found, &mut opened.notes);
     if let Some((found, source)) = values {
-        add_values(source, &found, &mut opened)?;
+        add_values(source, &found, &mut opened).map_err(of_solution)?;
         note_spare("the solution", &found, &mut opened.notes);
     }
     Ok(opened)

@@ -46,7 +46,7 @@ fn the_volume_reader_says_that_it_is_a_grid() {
     }
     for (name, bytes) in names.iter().filter(|(name, _)| !name.ends_with(".tif")) {
         let said = open(&write(folder.path(), name, bytes), &OpenOptions::default()).unwrap_err().to_string();
-        assert!(said.ends_with("it is a structured grid, which `open_grid` opens"), "{said}");
+        assert!(said.ends_with("it is a structured grid, and no volume"), "{said}");
     }
 }
 
@@ -64,7 +64,7 @@ fn volumes_empty_and_unknown_files_are_named() {
         "no known format of structured grids; it starts with \"Dear friend,\\n\""
     );
     let nrrd = said("v.nrrd", b"NRRD0004\ntype: uchar\n");
-    assert_eq!(nrrd, "format \"NRRD\" is not supported; it is a volume, which `open` opens");
+    assert_eq!(nrrd, "format \"NRRD\" is not supported; it is a volume, and no structured grid");
     let points = b"# vtk DataFile Version 3.0\n\nASCII\nDATASET STRUCTURED_POINTS\n";
     assert!(said("v.vtk", points).ends_with("`open` reads it as a volume"));
     assert!(refusal(&folder.path().join("gone.xyz"), &options()).starts_with("cannot read the file"));
@@ -80,10 +80,7 @@ fn a_solution_beside_a_grid_is_noted() {
     let solution = write(folder.path(), "combq.bin", &plot3d::PLAIN.solution(grids));
     let notes = open_grid(&path, &options()).unwrap().notes;
     assert_eq!(notes, [GridNote::SolutionBeside { name: "combq.bin".to_owned() }]);
-    assert_eq!(
-        notes[0].to_string(),
-        "\"combq.bin\" beside it may have its values: state it as `GridOptions::solution`"
-    );
+    assert_eq!(notes[0].to_string(), "\"combq.bin\" beside it may have its values: state it as the solution");
     let mut with_solution = options();
     with_solution.solution = Some(solution.clone());
     assert_eq!(open_grid(&path, &with_solution).unwrap().grids[0].fields().len(), 5);

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use brickfield::core::glam::DVec3;
-use brickfield::core::{Aabb, Camera, Image, StructuredGrid, TransferFunction, ValueRange};
+use brickfield::core::glam::UVec3;
+use brickfield::core::{Camera, Image, StructuredGrid, TransferFunction, ValueRange};
 use brickfield::curvilinear::CurvilinearGrid;
 use brickfield::frame::{Backend, Cells, CellsPlan, CellsView, Frame, MeshLines, MeshPlan, MeshView, Sampling};
 use brickfield::io::WorldFrame;
@@ -12,7 +12,7 @@ use brickfield::options::OptionError;
 use brickfield::{SurfaceNormals, check_picture_path, joined_mesh, spectrum, write_picture};
 
 use crate::backend::check_validation;
-use crate::grid_input::{box_grid, check_plane, range_of};
+use crate::grid_input::{box_grid, check_plane};
 use crate::{CellsArgs, Failure, print};
 
 pub(crate) fn run(args: &CellsArgs) -> Result<(), Failure> {
@@ -21,16 +21,26 @@ pub(crate) fn run(args: &CellsArgs) -> Result<(), Failure> {
     let mut backend = args.backend.open()?;
     let (grid, field) = args.input.open()?;
     args.plane.iter().try_for_each(|plane| check_plane(&grid, *plane))?;
+    if grid.n_nodes().min_element() < 2 {
+        return Err(Failure::usage(NoCells { n: grid.n_nodes() }));
+    }
     let cells = Arc::new(Cells::of_grid(&grid, field)?);
-    let around = extent(&cells);
-    let camera = args.camera.camera(&box_grid(&around), WorldFrame::default(), args.size).map_err(OptionError::from)?;
-    let range = range_of(&cells.nodes().iter().map(|node| node.value).collect::<Vec<_>>());
+    let around = cells.extent();
+    let camera =
+        args.camera.camera(&box_grid(Some(around))?, WorldFrame::default(), args.size).map_err(OptionError::from)?;
+    let range = cells.range();
     let transfer = transfer(args, range, around.diagonal())?;
     let behind = surfaces(args, &grid, field, range, &camera, backend.as_mut())?;
     let sampling = Sampling::new(around.diagonal() / f64::from(args.steps), args.rule, args.mode)?;
     let view = CellsView { camera, size: args.size, sampling, transfer, behind };
     let plan = CellsPlan::new(cells, view).map_err(Failure::usage)?;
     let frame = backend.render_cells(&plan)?;
+    if frame.image.pixels().iter().all(|pixel| pixel[3] == 0.0) {
+        let (min, max) = (range.min, range.max);
+        eprintln!(
+            "note: nothing is visible: the transfer function is 0 over the values {min} to {max}, or nothing is in the view"
+        );
+    }
     let attributes = vec![
         ("file", args.input.file.file_name().unwrap_or_default().to_string_lossy().into_owned()),
         ("field", grid.fields()[field].name.clone()),
@@ -42,9 +52,19 @@ pub(crate) fn run(args: &CellsArgs) -> Result<(), Failure> {
     check_validation(&backend.validation_messages())
 }
 
-fn extent(cells: &Cells) -> Aabb {
-    let of = |position: [f32; 3]| cells.center() + DVec3::from(position.map(f64::from));
-    Aabb::of_points(cells.nodes().iter().map(|node| of(node.position)))
+/// Surfaces are drawn by another command.
+#[derive(Debug, thiserror::Error)]
+#[error("a grid of {} x {} x {} nodes has no cells; `brickfield surface` draws it", n.x, n.y, n.z)]
+struct NoCells {
+    n: UVec3,
+}
+
+/// The automatic one is of volumes' histograms.
+#[derive(Debug, thiserror::Error)]
+#[error("--transfer: {name:?} is neither a file nor a preset; the presets are {presets}")]
+struct NoSuchTransfer {
+    name: String,
+    presets: String,
 }
 
 fn transfer(args: &CellsArgs, range: ValueRange, length: f64) -> Result<TransferFunction, Failure> {
@@ -56,7 +76,7 @@ fn transfer(args: &CellsArgs, range: ValueRange, length: f64) -> Result<Transfer
         return Ok(read_transfer(path).map_err(OptionError::from)?);
     }
     let presets = Preset::ALL.map(|preset| preset.name()).join(", ");
-    Err(OptionError::NoSuchTransfer { name: args.transfer.clone(), presets }.into())
+    Err(Failure::usage(NoSuchTransfer { name: args.transfer.clone(), presets }))
 }
 
 /// The planes of the grid that are asked for, as an opaque surface amid the cells.

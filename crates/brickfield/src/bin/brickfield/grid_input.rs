@@ -41,6 +41,12 @@ enum GridFault {
     Values,
     #[error("--plane {axis}={index}: the grid has {n} nodes along {axis}, 0 to {}", n - 1)]
     Plane { axis: char, index: u32, n: u32 },
+    #[error("--plane {axis}: the grid has {} x {} x {} nodes, so that a plane of one {axis} is but a line", n.x, n.y, n.z)]
+    Line { axis: char, n: UVec3 },
+    #[error("the grid has no value that is no hole")]
+    Holes,
+    #[error("the grid reaches from {min} to {max}, which no camera sees")]
+    Extent { min: DVec3, max: DVec3 },
 }
 
 impl GridInput {
@@ -81,14 +87,24 @@ pub(crate) fn check_plane(grid: &StructuredGrid, plane: GridPlane) -> Result<(),
         GridPlane::J(j) => ('j', j, nodes.y),
         GridPlane::K(k) => ('k', k, nodes.z),
     };
-    if index < n { Ok(()) } else { Err(Failure::usage(GridFault::Plane { axis, index, n })) }
+    if index >= n {
+        return Err(Failure::usage(GridFault::Plane { axis, index, n }));
+    }
+    let n_across = nodes.to_array().into_iter().zip("ijk".chars()).filter(|(_, other)| *other != axis);
+    match n_across.map(|(n, _)| n).min() {
+        Some(0 | 1) => Err(Failure::usage(GridFault::Line { axis, n: nodes })),
+        _ => Ok(()),
+    }
 }
 
-/// A grid of one voxel, which is a box: cameras find their place by it.
-pub(crate) fn box_grid(around: &Aabb) -> Grid {
+/// A grid of one voxel, which is a box: cameras find their place by it. Without a box there is nothing to be seen.
+pub(crate) fn box_grid(around: Option<Aabb>) -> Result<Grid, Failure> {
+    let around = around.ok_or(GridFault::Holes)?;
+    let (min, max) = (around.min, around.max);
     let extent = around.max - around.min;
     let size = extent.max(DVec3::splat(extent.max_element() * 1e-6)).max(DVec3::splat(f64::MIN_POSITIVE));
-    Grid::from_first_sample(UVec3::ONE, size, around.min + 0.5 * size, DMat3::IDENTITY).expect("a box has a size")
+    Grid::from_first_sample(UVec3::ONE, size, around.min + 0.5 * size, DMat3::IDENTITY)
+        .map_err(|_| GridFault::Extent { min, max }.into())
 }
 
 /// The range of values that are no holes; 0 to 0 if all are.

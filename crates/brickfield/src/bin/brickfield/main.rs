@@ -229,7 +229,7 @@ struct CellsArgs {
     /// Background behind the picture in PNG files, linear: R,G,B or one number for grey
     #[arg(long, value_name = "RGB", default_value = "0", value_parser = values::background)]
     background: Background,
-    /// Transfer function: a preset, or a JSON or TOML file of knots, as of `brickfield render`
+    /// Transfer function: a preset, or a JSON or TOML file of knots, as of `brickfield render` (auto is of volumes alone)
     #[arg(long, value_name = "TF", default_value = "linear")]
     transfer: String,
     /// Steps along the diagonal of the box around all cells
@@ -247,8 +247,8 @@ struct CellsArgs {
     /// Light on the planes
     #[command(flatten)]
     light: LightSourceOptions,
-    /// Draw the outlines of the planes' zones, so many pixels wide
-    #[arg(long, value_name = "PIXELS", requires = "plane", value_parser = values::positive, allow_hyphen_values = true)]
+    /// Draw the outlines of the planes' zones, so many pixels wide, at most 64
+    #[arg(long, value_name = "PIXELS", requires = "plane", value_parser = values::line_width, allow_hyphen_values = true)]
     lines: Option<f64>,
 }
 
@@ -264,13 +264,13 @@ struct SurfaceArgs {
     /// Plane of the grid: i=N, j=N or k=N, from 0; k=0 unless stated, which of terrain is a height field
     #[arg(long, value_name = "PLANE", value_parser = values::plane)]
     plane: Option<GridPlane>,
-    /// By how much heights of terrain are exaggerated; 0: flat
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = values::factor, allow_hyphen_values = true)]
-    exaggeration: f64,
+    /// By how much heights of terrain are exaggerated, 1 unless stated; 0: flat
+    #[arg(long, value_name = "FACTOR", value_parser = values::exaggeration, allow_hyphen_values = true)]
+    exaggeration: Option<f64>,
     /// Size of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = values::size)]
     size: UVec2,
-    /// Where the picture is taken from, as of `brickfield render`
+    /// Where the picture is taken from, as of `brickfield render`; oblique if fields are stated and no view is
     #[arg(long, value_name = "VIEW", default_value = "top")]
     camera: Viewpoint,
     /// Background behind the picture in PNG files, linear: R,G,B or one number for grey
@@ -288,13 +288,14 @@ struct SurfaceArgs {
     /// Normals of the surface: grid (of its finest zones, whatever is drawn) or triangles (each is a plane)
     #[arg(long, value_name = "WHICH", default_value = "grid", value_parser = values::surface_normals)]
     normals: SurfaceNormals,
-    /// Draw the outlines of zones, so many pixels wide
-    #[arg(long, value_name = "PIXELS", value_parser = values::positive, allow_hyphen_values = true)]
+    /// Draw the outlines of zones, so many pixels wide, at most 64
+    #[arg(long, value_name = "PIXELS", value_parser = values::line_width, allow_hyphen_values = true)]
     lines: Option<f64>,
-    /// Draw so many zones, those with the greatest errors divided first; all zones unless stated
+    /// Draw so many zones, those with the greatest errors divided first; all zones unless stated. Zones around holes, and those that cannot be
+    /// coarse, are drawn in any case
     #[arg(long, value_name = "N", conflicts_with = "granularity", value_parser = clap::value_parser!(u32).range(1..))]
     zones: Option<u32>,
-    /// Draw zones as coarse as they may be without being larger than so many pixels
+    /// Draw zones as coarse as they may be with their shorter diagonal below so many pixels, seen face on
     #[arg(long, value_name = "PIXELS", value_parser = values::positive, allow_hyphen_values = true)]
     granularity: Option<f64>,
     /// Draw a bar of the colours with their values

@@ -6,7 +6,7 @@ use brickfield::core::{Camera, GridPoints, NodeField, StructuredGrid, TransferFu
 use brickfield::curvilinear::{BudgetSelector, CurvilinearGrid, GridPlane, QuadTree, Selection, SizeSelector, View};
 use brickfield::frame::{Coloring, MeshFrame, MeshLines, MeshPlan, MeshView};
 use brickfield::io::WorldFrame;
-use brickfield::optics::read_transfer;
+use brickfield::optics::{ReadTransferError, read_transfer};
 use brickfield::options::OptionError;
 use brickfield::overlay::show_color_bar;
 use brickfield::{check_picture_path, spectrum, surface_mesh, write_picture};
@@ -23,7 +23,7 @@ pub(crate) fn run(args: &SurfaceArgs) -> Result<(), Failure> {
     let subject = Subject::open(args)?;
     let camera = args
         .camera
-        .camera(&box_grid(&subject.tree.extent(subject.tree.layout().root())), WorldFrame::default(), args.size)
+        .camera(&box_grid(subject.tree.grid().extent())?, WorldFrame::default(), args.size)
         .map_err(OptionError::from)?;
     let selection = subject.select(args, &camera)?;
     let mesh = Arc::new(surface_mesh(subject.tree.grid(), &selection, args.normals)?);
@@ -39,12 +39,30 @@ pub(crate) fn run(args: &SurfaceArgs) -> Result<(), Failure> {
     let frame = backend.render_mesh(&plan)?;
     let mut image = frame.image();
     if args.color_bar {
-        image = show_color_bar(&image, &subject.colors, subject.range, &subject.title());
+        let with_bar = show_color_bar(&image, &subject.colors, subject.range, &subject.title());
+        if with_bar == image {
+            eprintln!("note: --color-bar: there is no room for a bar in the picture, or only one value");
+        }
+        image = with_bar;
     }
     let attributes = attributes(args, &subject, &selection, &plan);
     write_picture(&args.out, &image, args.background.0, &attributes)?;
     print(&summary(&subject, &selection, &plan, &frame, backend.describe().backend))?;
     check_validation(&backend.validation_messages())
+}
+
+/// Colours of values are a transfer function without extinction.
+#[derive(Debug, thiserror::Error)]
+#[error("--colors: {source}")]
+struct ColorsFault {
+    source: ReadTransferError,
+}
+
+/// Planes of curvilinear grids lie where their nodes are.
+#[derive(Debug, thiserror::Error)]
+#[error("--exaggeration {factor}: the surface is no terrain, whose values are heights")]
+struct NoHeights {
+    factor: f64,
 }
 
 /// A surface that is ready to be drawn.
@@ -64,7 +82,7 @@ impl Subject {
         let tree = Arc::new(QuadTree::build(surface));
         let range = range_of(tree.grid().values());
         let colors = match &args.colors {
-            Some(path) => read_transfer(path).map_err(OptionError::from)?,
+            Some(path) => read_transfer(path).map_err(|source| ColorsFault { source })?,
             None => spectrum(range).map_err(OptionError::from)?,
         };
         Ok(Subject { tree, field: name.clone(), unit: unit.clone(), range, colors })
@@ -75,6 +93,10 @@ impl Subject {
         if let Some(n_zones) = args.zones {
             let mut selector = BudgetSelector::new(self.tree.clone());
             selector.update(&view, n_zones as usize);
+            let n_drawn = selector.selection().n_leaves();
+            if n_drawn > n_zones as usize {
+                eprintln!("note: --zones {n_zones}: {n_drawn} are drawn, for zones around holes cannot be coarse");
+            }
             return Ok(selector.selection().clone());
         }
         // Zones below no number of pixels are the final ones.
@@ -96,12 +118,13 @@ impl Subject {
 fn zones(grid: &StructuredGrid, field: usize, args: &SurfaceArgs) -> Result<CurvilinearGrid, Failure> {
     let plane = args.plane.unwrap_or(GridPlane::K(0));
     check_plane(grid, plane)?;
-    let is_terrain = grid.n_nodes().z == 1 && args.plane.is_none() && matches!(grid.points(), GridPoints::Even { .. });
-    let made = match is_terrain {
-        true => CurvilinearGrid::of_heights(grid, field, args.exaggeration),
-        false => CurvilinearGrid::of_plane(grid, plane, field),
-    };
-    Ok(made?)
+    let is_terrain =
+        grid.n_nodes().z == 1 && plane == GridPlane::K(0) && matches!(grid.points(), GridPoints::Even { .. });
+    match (is_terrain, args.exaggeration) {
+        (true, exaggeration) => Ok(CurvilinearGrid::of_heights(grid, field, exaggeration.unwrap_or(1.0))?),
+        (false, None) => Ok(CurvilinearGrid::of_plane(grid, plane, field)?),
+        (false, Some(factor)) => Err(Failure::usage(NoHeights { factor })),
+    }
 }
 
 fn attributes(
