@@ -1,12 +1,13 @@
 //! How Brickfield is held to its numbers: analytic volumes, metrics, comparisons against the f64 answer, and reports.
 //!
 //! Unpublished. `compare` (binary) renders a scene on every backend and reports error against run time; `conformance` holds
-//! every backend to the f64 answer, and its own cases to mutants; `orders` prints observed orders of accuracy; `speed` times; `gpu`
-//! measures a graphics card, alone. Whatever is timed is timed by [`turns`].
+//! every backend to the f64 answer, and its own cases to mutants; `orders` prints observed orders of accuracy; `speed` times; `frames`
+//! times steady frames of a file; `gpu` measures a graphics card, alone. Whatever is timed is timed by [`turns`].
 
 pub mod codecs;
 pub mod compare;
 pub mod conformance;
+pub mod frames;
 pub mod gpu;
 pub mod lamar;
 pub mod left_out;

@@ -19,8 +19,8 @@ use spawn::{Spawn, Tool, cargo};
 /// The project's commands
 ///
 /// Start with `cargo xtask setup` on a new machine, then `cargo xtask compare`. Exit codes: 0 good, 1 something failed or
-/// is missing, 2 bad arguments; compare, conformance, gpu, orders, sheet, speed, test and bench pass on what the program that they run says.
-/// `cargo xtask compare --help` shows what can be chosen; so do those of conformance, gpu, orders, sheet and speed. They are built first.
+/// is missing, 2 bad arguments; compare, conformance, frames, gpu, orders, sheet, speed, test and bench pass on what the program that they run says.
+/// `cargo xtask compare --help` shows what can be chosen; so do those of conformance, frames, gpu, orders, sheet and speed. They are built first.
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", after_help = ENVIRONMENT)]
 struct Arguments {
@@ -59,6 +59,9 @@ enum Command {
     /// `--short` for a software driver. The program itself (`gpu`) runs on machines without cargo.
     #[command(disable_help_flag = true)]
     Gpu(Passed),
+    /// Render steady frames of a turning camera, and say how long each part takes
+    #[command(disable_help_flag = true)]
+    Frames(Passed),
     /// Measure the order of accuracy of every quadrature rule
     #[command(disable_help_flag = true)]
     Orders(Passed),
@@ -104,6 +107,7 @@ fn main() -> Result<ExitCode> {
         Command::Test(passed) => of_packages(cargo("test"), &passed.typed()),
         Command::Conformance(passed) => Tool::Conformance.run(&passed.typed()),
         Command::Gpu(passed) => Tool::Gpu.run(&passed.typed()),
+        Command::Frames(passed) => Tool::Frames.run(&passed.typed()),
         Command::Orders(passed) => Tool::Orders.run(&passed.typed()),
         Command::Speed(passed) => Tool::Speed.run(&passed.typed()),
         Command::Sheet(passed) => Tool::Sheet.run(&passed.typed()),

@@ -15,6 +15,7 @@ pub(crate) struct Spawn(Command);
 pub(crate) enum Tool {
     Compare,
     Conformance,
+    Frames,
     Gpu,
     Orders,
     Sheet,
@@ -86,6 +87,7 @@ impl Tool {
     fn name(self) -> &'static str {
         match self {
             Tool::Compare => "compare",
+            Tool::Frames => "frames",
             Tool::Conformance => "conformance",
             Tool::Gpu => "gpu",
             Tool::Orders => "orders",

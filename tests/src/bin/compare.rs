@@ -115,7 +115,9 @@ fn finish(args: &CompareArgs, report: &Report) -> ExitCode {
     };
     let out = args.out.display();
     let places = format!("{out}/report.json, {out}/index.html, {out}/images/ ({:.0} s)\n", report.total_seconds);
-    if let Err(e) = say(&format!("{}\n* on the Pareto front\n{}{left_out}{places}", table(report), absences(report))) {
+    if let Err(e) =
+        say(&format!("{}\n* on the Pareto front\n{}{left_out}{places}", table(report), absences(&report.backends)))
+    {
         eprintln!("compare: {e}");
         return ExitCode::FAILURE;
     }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, TableComponent, presets::NOTHING};
 
-use super::{Report, Row, SETUP_COMMAND, step_label};
+use super::{BackendInfo, Report, Row, SETUP_COMMAND, step_label};
 
 const HEADER: [&str; 11] =
     ["", "backend", "mode", "rule", "step", "samples", "ms (min-max)", "RMSE", "max", "dE mean", "dE 95 %"];
@@ -24,9 +24,9 @@ pub fn table(report: &Report) -> String {
 }
 
 /// A line for each backend that did not take part, and the command that helps; empty if all did.
-pub fn absences(report: &Report) -> String {
+pub fn absences(backends: &[BackendInfo]) -> String {
     let mut text = String::new();
-    for b in &report.backends {
+    for b in backends {
         if let Some(reason) = &b.absent {
             let _ = writeln!(text, "absent: {}: {reason}", b.backend);
         }
@@ -69,9 +69,9 @@ mod tests {
     #[test]
     fn absent_backends_are_named_with_the_command_that_helps() {
         let mut report = report();
-        let text = absences(&report);
+        let text = absences(&report.backends);
         assert!(text.contains("absent: ash: no Vulkan") && text.contains(SETUP_COMMAND));
         report.backends.iter_mut().for_each(|b| b.absent = None);
-        assert_eq!(absences(&report), "");
+        assert_eq!(absences(&report.backends), "");
     }
 }

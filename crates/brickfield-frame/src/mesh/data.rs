@@ -91,7 +91,7 @@ impl Mesh {
                 .fold(Aabb { min: *first, max: *first }, |b, p| Aabb { min: b.min.min(*p), max: b.max.max(*p) });
         }
         let (center, radius) = (extent.center(), 0.5 * extent.diagonal());
-        if !(radius <= Mesh::MAX_RADIUS) {
+        if radius.is_nan() || radius > Mesh::MAX_RADIUS {
             return Err(MeshError::Far { radius });
         }
         let unit = if radius > 0.0 { 2f64.powi(radius.max(LEAST_UNIT).log2().ceil() as i32) } else { 1.0 };

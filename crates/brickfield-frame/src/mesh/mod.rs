@@ -114,7 +114,7 @@ impl MeshPlan {
         }
         let rays = ViewRays::new(&camera, size, mesh.center(), mesh.radius());
         let (reach, most) = (rays.eye().length() + mesh.radius(), MOST_REACH * mesh.unit().min(1.0));
-        if !(reach <= most) {
+        if reach.is_nan() || reach > most {
             return Err(MeshPlanError::Far { reach, most });
         }
         // Sides, and the gradient of a surface, are of volumes.
