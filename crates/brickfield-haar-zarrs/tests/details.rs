@@ -132,7 +132,8 @@ fn parts_come_back() {
     let error = array.retrieve_array_subset::<u16>(&beyond).unwrap_err().to_string();
     assert!(error.contains("30..38") && error.contains("[11, 21, 37]"), "{error}");
     let error = array.retrieve_all::<i16>().unwrap_err().to_string();
-    assert_eq!(error, "samples of i16 are asked for of an array of uint16");
+    // zarrs may add the name of Zarr 2.
+    assert!(error.starts_with("samples of i16 are asked for of an array of uint16"), "{error}");
 }
 
 #[test]

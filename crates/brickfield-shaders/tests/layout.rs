@@ -55,7 +55,7 @@ fn host_and_shader_structs_have_the_same_layout() {
     let mesh = specialise(&Variant::mesh(shading)).unwrap().module;
     #[rustfmt::skip]
     assert_equal(&mesh, "MeshView", host!(MeshUniforms, clip_x, clip_y, clip_z, clip_w, anchor, anchor_right, anchor_down, direction,
-        direction_right, direction_down, line, source, n_knots, shininess, padding));
+        direction_right, direction_down, line, source, n_knots, shininess, unit, padding));
     assert_equal(&mesh, "Vertex", host!(MeshVertex, position, normal));
     let midpoint = QuadratureRule::MidpointExponential;
     let cells = Variant::new(FeatureSet::default(), midpoint, Entry::Cells(CellsShading::default()));

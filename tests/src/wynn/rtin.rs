@@ -119,9 +119,8 @@ mod tests {
     fn a_plane_is_two_triangles_and_noise_is_all() {
         let plane = Rtin::new(&grid(16, |row, column| (3 * row + column) as f32), 4).unwrap();
         assert_eq!(plane.triangles(0.0).1.len(), 2);
-        let noise =
-            Rtin::new(&grid(16, |row, column| ((row * 7919 + column * 104_729) ^ (row * column)) as f32 % 97.0), 4)
-                .unwrap();
+        let value = |row, column| (row as f32 * 12.9898 + column as f32 * 78.233).sin() * 97.0;
+        let noise = Rtin::new(&grid(16, value), 4).unwrap();
         assert_eq!(noise.triangles(0.0).1.len(), 2 * 16 * 16);
         assert!(Rtin::new(&grid(15, |_, _| 0.0), 4).is_none());
     }

@@ -86,7 +86,8 @@ fn a_solution_beside_a_grid_is_noted() {
     assert_eq!(open_grid(&path, &with_solution).unwrap().grids[0].fields().len(), 5);
     assert_eq!(
         refusal(&solution, &options()),
-        "PLOT3D file \"a solution of 4 x 3 x 2 nodes\" is not supported; its grid is, with it as `solution`"
+        "PLOT3D file \"a solution of 4 x 3 x 2 nodes\" is not supported; it is the solution of a grid: \
+         open that, with this file as its solution"
     );
     let dem = write(folder.path(), "v.dem", b"x");
     assert!(refusal(&dem, &with_solution).starts_with("solution of format \"USGS DEM\" is not supported"));
