@@ -43,16 +43,15 @@ pub fn n_rays_that_go_on(plan: &FramePlan, group_height: u32) -> u64 {
 /// # Errors
 /// Rays that may pass so many cells and segments that an invocation's loops would end without a word.
 pub fn rows_of_cells(plan: &CellsPlan) -> Result<Vec<Range<u32>>, RenderError> {
-    // A ray may pass a bent axis there and back.
-    let n_cells = 2.0 * f64::from(plan.cells().n_cells().element_sum());
+    let n_cells = f64::from(plan.cells().n_cells().element_sum());
     let n_segments = 2.0 * plan.cells().radius() / plan.sampling().step_world();
     let rule = plan.sampling().rule();
     let n_knots = plan.transfer().knots().len();
-    // A cell goes round the walk once, and once for its segments, and the last segment walks again. A segment goes round once, and for
-    // each node as often as its place in a cell is improved.
+    // A ray may pass a bent axis there and back. A cell goes round the walk once, and once for its segments, and the last segment walks
+    // again. A segment goes round once, and for each node as often as its place in a cell is improved.
     let of_places = rule.nodes().len() as f64 * ROUNDS_OF_PLACE;
     let of_segment = 2.0 + of_places + rounds_of_knots(rule, n_knots, KnotSearch::among(n_knots));
-    let rounds = ROUNDS_OF_FACES + 3.0 * n_cells + of_segment * n_segments;
+    let rounds = ROUNDS_OF_FACES + 6.0 * n_cells + of_segment * n_segments;
     if rounds > MOST_ROUNDS {
         return Err(RenderError::Unsupported { what: "walk rays of so many cells and segments in one dispatch" });
     }

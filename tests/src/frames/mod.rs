@@ -87,7 +87,7 @@ pub struct FramesArgs {
 #[allow(missing_docs)]
 pub enum FramesError {
     #[error(transparent)]
-    Compare(#[from] CompareError),
+    Compare(Box<CompareError>),
     #[error(transparent)]
     Prepare(#[from] PrepareError),
     #[error("{backend}: {source}")]
@@ -96,7 +96,13 @@ pub enum FramesError {
 
 impl From<OptionError> for FramesError {
     fn from(e: OptionError) -> FramesError {
-        FramesError::Compare(CompareError::Options(e))
+        CompareError::Options(e).into()
+    }
+}
+
+impl From<CompareError> for FramesError {
+    fn from(e: CompareError) -> FramesError {
+        FramesError::Compare(Box::new(e))
     }
 }
 
