@@ -148,6 +148,12 @@ pub fn greatest_difference(a: &Image<f32>, b: &Image<f32>) -> f64 {
     differences.fold(0.0, |most: f64, d| if d > most || d.is_nan() { d } else { most })
 }
 
+/// The share of pixels of which a channel differs by more than a bound, in two pictures of one size.
+pub fn share_beyond(a: &Image<f32>, b: &Image<f32>, bound: f64) -> f64 {
+    let differs = |(a, b): (&[f32; 4], &[f32; 4])| (0..4).any(|c| f64::from((a[c] - b[c]).abs()) > bound);
+    a.pixels().iter().zip(b.pixels()).filter(|pair| differs(*pair)).count() as f64 / a.pixels().len() as f64
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

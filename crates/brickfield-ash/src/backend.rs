@@ -18,7 +18,7 @@ use crate::resources::{Brought, Resources, missing};
 use crate::staging::Staging;
 use crate::stored_pipelines::StoredPipelines;
 use crate::vulkan::{
-    Bindable, Canvas, CanvasKind, Device, Instance, PhysicalDevice, Pipeline, Queue, Use, VulkanImage, physical_devices,
+    Canvas, CanvasKind, Device, Instance, PhysicalDevice, Pipeline, Queue, Use, VulkanImage, physical_devices,
 };
 use crate::{ConnectError, Options, PipelineFile, SaveError, ValidationLog};
 
@@ -132,10 +132,7 @@ impl AshBackend {
             self.resources.reserve_rays(n_rays_that_go_on(plan, group_height))?;
         }
         let resources = &self.resources;
-        let bound = pipeline.bind(|binding| match binding.resource {
-            Resource::Picture => Some(Bindable::Picture(picture)),
-            _ => resources.bindable(binding),
-        })?;
+        let bound = pipeline.bind(|binding| resources.bindable_with(picture, binding))?;
         let upload_ms = milliseconds_since(started);
         let target = resources.buffer(Resource::Frame).ok_or_else(|| missing(Resource::Frame))?;
         let passes = passes(plan, group_height, is_first);

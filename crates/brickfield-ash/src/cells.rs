@@ -3,32 +3,29 @@
 use std::time::Instant;
 
 use brickfield_frame::{
-    CellsBackend, CellsPlan, Cost, Frame, FrameUniforms, Pass, RenderError, Resource, Target, check_memory,
+    CellsBackend, CellsPlan, Cost, Frame, FrameUniforms, RenderError, Resource, Target, check_memory,
 };
-use brickfield_shaders::{PipelineKey, rows_of_cells};
+use brickfield_shaders::{PipelineKey, passes_of_cells};
 
 use crate::AshBackend;
 use crate::backend::timing;
 use crate::march::{march, milliseconds_since, read_back, reserve_picture};
 use crate::resources::missing;
-use crate::vulkan::{Bindable, Use};
+use crate::vulkan::Use;
 
 impl CellsBackend for AshBackend {
     fn render_cells(&mut self, plan: &CellsPlan) -> Result<Frame, RenderError> {
         self.check_size(plan.size())?;
         check_memory(plan.size())?;
         let started = Instant::now();
-        let passes: Vec<Pass> = rows_of_cells(plan)?.into_iter().map(Pass::whole_rays).collect();
+        let passes = passes_of_cells(plan)?;
         let pipeline = self.pipelines.of(PipelineKey::cells(plan))?;
         let bindings = pipeline.bindings().to_vec();
         let contents = |resource| plan.content(resource);
         let uploaded_bytes = self.resources.bring_contents(&mut self.queue, &mut self.staging, &contents, &bindings)?;
         let picture = reserve_picture(&mut self.picture, &self.device, plan.size())?;
         let resources = &self.resources;
-        let bound = pipeline.bind(|binding| match binding.resource {
-            Resource::Picture => Some(Bindable::Picture(picture)),
-            _ => resources.bindable(binding),
-        })?;
+        let bound = pipeline.bind(|binding| resources.bindable_with(picture, binding))?;
         let upload_ms = milliseconds_since(started);
         let uniforms = resources.buffer(Resource::Frame).ok_or_else(|| missing(Resource::Frame))?;
         let time = march(&mut self.queue, &bound, picture, (uniforms, FrameUniforms::of_cells(plan)), &passes)?;

@@ -15,7 +15,7 @@ use crate::error::FailedCall;
 use crate::march::PIXEL_BYTES;
 use crate::staging::{Staging, Write};
 use crate::texture::Texture;
-use crate::vulkan::{Bindable, Buffer, Device, Pipeline, Queue, Sampler};
+use crate::vulkan::{Bindable, Buffer, Device, Pipeline, Queue, Sampler, VulkanImage};
 
 /// The buffers and textures that shaders read and write.
 pub(crate) struct Resources {
@@ -227,6 +227,14 @@ impl Resources {
         let shape = self.textures.get(&Resource::Atlas).and_then(Texture::atlas_shape);
         let side = plan.field().slots().brick_side();
         shape.filter(|s| Some(s.side) == side).unwrap_or(AtlasShape::least(side.unwrap_or(BrickSide::S16)))
+    }
+
+    /// As [`bindable`](Self::bindable), of a shader that writes to a picture.
+    pub(crate) fn bindable_with<'a>(&'a self, picture: &'a VulkanImage, binding: &Binding) -> Option<Bindable<'a>> {
+        match binding.resource {
+            Resource::Picture => Some(Bindable::Picture(picture)),
+            _ => self.bindable(binding),
+        }
     }
 
     /// The buffer, texture or sampler of a shader's binding.

@@ -82,7 +82,9 @@ impl StructuredGrid {
     /// Not one mark for each node.
     pub fn with_holes(mut self, holes: &[bool]) -> Result<StructuredGrid, StructuredGridError> {
         self.check_count(|| "marks of holes".into(), holes.len(), self.n())?;
-        self.add_holes(holes.iter().copied());
+        if holes.contains(&true) {
+            self.add_holes(holes.iter().copied());
+        }
         Ok(self)
     }
 
@@ -115,6 +117,12 @@ impl StructuredGrid {
     pub fn number(&self, node: UVec3) -> usize {
         let [nx, ny, _] = self.n_nodes.to_array().map(|n| n as usize);
         node.x as usize + nx * (node.y as usize + ny * node.z as usize)
+    }
+
+    /// The node with a number.
+    pub fn node(&self, number: usize) -> UVec3 {
+        let [nx, ny, _] = self.n_nodes.to_array().map(|n| n as usize);
+        UVec3::new((number % nx) as u32, (number / nx % ny) as u32, (number / nx / ny) as u32)
     }
 
     /// Where a node lies.
@@ -172,11 +180,6 @@ impl StructuredGrid {
     fn corners(&self) -> impl Iterator<Item = UVec3> + use<> {
         let last = self.n_nodes - 1;
         (0..8).map(move |i| last * UVec3::new(i & 1, i >> 1 & 1, i >> 2))
-    }
-
-    fn node(&self, number: usize) -> UVec3 {
-        let [nx, ny, _] = self.n_nodes.to_array().map(|n| n as usize);
-        UVec3::new((number % nx) as u32, (number / nx % ny) as u32, (number / nx / ny) as u32)
     }
 }
 

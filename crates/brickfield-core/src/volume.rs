@@ -23,6 +23,13 @@ pub struct ValueRange {
 }
 
 impl ValueRange {
+    /// The range of some values, NaN passed over; `None` without any.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Option<ValueRange> {
+        let empty = (f64::INFINITY, f64::NEG_INFINITY);
+        let (min, max) = values.into_iter().fold(empty, |(min, max), v| (min.min(v), max.max(v)));
+        (min <= max).then_some(ValueRange { min, max })
+    }
+
     /// The smallest range around both.
     pub fn union(self, other: ValueRange) -> ValueRange {
         ValueRange { min: self.min.min(other.min), max: self.max.max(other.max) }

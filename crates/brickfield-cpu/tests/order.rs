@@ -1,22 +1,15 @@
 //! Observed orders of accuracy of the discrete sum, against the continuous answer and closed forms.
 
+#[path = "support/slope.rs"]
+mod slope;
 mod support;
 
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Camera, Projection, ScalarType, TransferFunction, Volume};
 use brickfield_cpu::{ContinuousOptions, closed_form, continuous, discrete};
 use brickfield_optics::QuadratureRule;
+use slope::slope;
 use support::{Setup, difference, knot, whole};
-
-/// Least-squares slope of log2(error) over halvings.
-fn slope(errors: &[f64]) -> f64 {
-    let n = errors.len() as f64;
-    let mean_x = (n - 1.0) / 2.0;
-    let mean_y = errors.iter().map(|e| e.log2()).sum::<f64>() / n;
-    let xy: f64 = errors.iter().enumerate().map(|(i, e)| (i as f64 - mean_x) * (e.log2() - mean_y)).sum();
-    let xx: f64 = (0..errors.len()).map(|i| (i as f64 - mean_x).powi(2)).sum();
-    -xy / xx
-}
 
 /// Every rule has its order in the step, on rays along an axis through a field that is smooth along them: linear in each
 /// cell and the same slope in all, so that no face is a kink, and exact in f32, as bricks store it.

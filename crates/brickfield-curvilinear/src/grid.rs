@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use brickfield_core::Aabb;
 use brickfield_core::glam::{DVec3, Vec3};
+use brickfield_core::{Aabb, ValueRange};
 
 use crate::{LayoutError, QuadLayout};
 
@@ -210,6 +210,11 @@ impl CurvilinearGrid {
                 field.at(node, if value.is_nan() { 0.0 } else { f64::from(value) })
             }
         }
+    }
+
+    /// The range of the values of all nodes that are no holes; `None` if all are.
+    pub fn range(&self) -> Option<ValueRange> {
+        ValueRange::of(self.values.iter().map(|value| f64::from(*value)))
     }
 
     /// The box around all nodes that are no holes; `None` if all are.

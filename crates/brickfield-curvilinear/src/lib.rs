@@ -36,7 +36,7 @@ pub use mesh::{OtherGrid, SurrogateMesh, surrogate_mesh};
 pub use oct_tree::{OctTree, OctTreeError};
 pub use oct_zone::{OctSummary, examine_cells};
 pub use octree::{CellBox, OctLayout, OctLayoutError, OctZone};
-pub use plane::{GridPlane, GridPlaneError};
+pub use plane::GridPlaneError;
 pub use select::{BudgetSelector, GranularityError, Label, Selection, SelectionError, SelectionWork, SizeSelector};
 pub use surface::{IndexPlane, SurfaceError};
 pub use tree::{ByteAccount, QuadTree};

@@ -1,11 +1,11 @@
 //! What is stored of a zone of a volume, and how it is found out.
 
-use brickfield_core::Aabb;
 use brickfield_core::glam::{DVec3, UVec3, Vec3};
+use brickfield_core::{Aabb, rounded_up};
 use rayon::prelude::*;
 
 use crate::volume::CellMap;
-use crate::zone::rounded_up;
+use crate::zone::extension_to;
 use crate::{CellBox, CurvilinearVolume};
 
 /// What an octree knows of a zone: 32 bytes, stored for every zone above level 0.
@@ -178,8 +178,5 @@ fn extension(corners: &Aabb, scan: &Scan) -> Vec3 {
     if scan.low.x > scan.high.x {
         return Vec3::ZERO;
     }
-    let beyond = (corners.min - scan.low).max(scan.high - corners.max);
-    // The box is made by a sum, which rounds: room for that, too.
-    let room = scan.low.abs().max(scan.high.abs()).max(corners.min.abs()).max(corners.max.abs()) * f64::EPSILON;
-    Vec3::from([0, 1, 2].map(|i| if beyond[i] > 0.0 { rounded_up(beyond[i] + room[i]) } else { 0.0 }))
+    extension_to(corners, scan.low, scan.high)
 }

@@ -3,18 +3,7 @@
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{GridPoints, StructuredGrid};
 
-use crate::{CurvilinearGrid, CurvilinearGridError, HeightField, Positions};
-
-/// The nodes of a structured grid with one index fixed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum GridPlane {
-    /// Columns along j, rows along k.
-    I(u32),
-    /// Columns along k, rows along i.
-    J(u32),
-    /// Columns along i, rows along j.
-    K(u32),
-}
+use crate::{CurvilinearGrid, CurvilinearGridError, HeightField, IndexPlane, Positions};
 
 /// Why a plane of a structured grid is no grid of zones.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -31,23 +20,12 @@ pub enum GridPlaneError {
     Grid(#[from] CurvilinearGridError),
 }
 
-impl GridPlane {
-    /// The name of its axis, the fixed index, and the axes of columns and rows.
-    fn axes(self) -> (char, u32, [usize; 3]) {
-        match self {
-            GridPlane::I(index) => ('i', index, [1, 2, 0]),
-            GridPlane::J(index) => ('j', index, [2, 0, 1]),
-            GridPlane::K(index) => ('k', index, [0, 1, 2]),
-        }
-    }
-}
-
 impl CurvilinearGrid {
     /// A plane of a structured grid, with the values of one of its fields; holes are holes.
     ///
     /// # Errors
     /// No such plane or field; a plane of less than two rows or columns of nodes.
-    pub fn of_plane(grid: &StructuredGrid, plane: GridPlane, field: usize) -> Result<CurvilinearGrid, GridPlaneError> {
+    pub fn of_plane(grid: &StructuredGrid, plane: IndexPlane, field: usize) -> Result<CurvilinearGrid, GridPlaneError> {
         let nodes = PlaneNodes::of(grid, plane)?;
         let positions = nodes.iter().map(|node| grid.position(node)).collect();
         let [n_columns, n_rows] = nodes.n;
@@ -66,7 +44,7 @@ impl CurvilinearGrid {
         exaggeration: f64,
     ) -> Result<CurvilinearGrid, GridPlaneError> {
         let GridPoints::Even { origin, steps } = grid.points() else { return Err(GridPlaneError::NotEven) };
-        let nodes = PlaneNodes::of(grid, GridPlane::K(0))?;
+        let nodes = PlaneNodes::of(grid, IndexPlane::Z(0))?;
         let [n_columns, n_rows] = nodes.n;
         let heights = HeightField {
             origin: *origin,
@@ -83,28 +61,20 @@ impl CurvilinearGrid {
 struct PlaneNodes {
     /// Along columns and rows.
     n: [u32; 2],
-    axes: [usize; 3],
-    index: u32,
+    plane: IndexPlane,
 }
 
 impl PlaneNodes {
-    fn of(grid: &StructuredGrid, plane: GridPlane) -> Result<PlaneNodes, GridPlaneError> {
-        let (axis, index, axes @ [column, row, fixed]) = plane.axes();
-        let n = grid.n_nodes();
-        if index >= n[fixed] {
-            return Err(GridPlaneError::NoPlane { axis, index, n: n[fixed] });
+    fn of(grid: &StructuredGrid, plane: IndexPlane) -> Result<PlaneNodes, GridPlaneError> {
+        let (n, axis, index) = (grid.n_nodes(), plane.axis(), plane.index());
+        if index >= n[axis] {
+            return Err(GridPlaneError::NoPlane { axis: plane.letter(), index, n: n[axis] });
         }
-        Ok(PlaneNodes { n: [n[column], n[row]], axes, index })
+        Ok(PlaneNodes { n: plane.across().map(|axis| n[axis]), plane })
     }
 
-    fn iter(&self) -> impl Iterator<Item = UVec3> + use<'_> {
-        let [column, row, fixed] = self.axes;
-        let node = move |(c, r): (u32, u32)| {
-            let mut node = UVec3::ZERO;
-            (node[column], node[row], node[fixed]) = (c, r, self.index);
-            node
-        };
-        (0..self.n[1]).flat_map(move |r| (0..self.n[0]).map(move |c| (c, r))).map(node)
+    fn iter(&self) -> impl Iterator<Item = UVec3> + use<> {
+        self.plane.nodes(UVec3::ZERO, self.n)
     }
 
     fn values(&self, grid: &StructuredGrid, field: usize) -> Result<Vec<f32>, GridPlaneError> {
@@ -135,13 +105,13 @@ mod tests {
     #[test]
     fn planes_have_their_nodes() {
         let node = |row, column| Node { row, column };
-        let i = CurvilinearGrid::of_plane(&grid(), GridPlane::I(1), 0).unwrap();
+        let i = CurvilinearGrid::of_plane(&grid(), IndexPlane::X(1), 0).unwrap();
         assert_eq!((i.n_columns(), i.n_rows()), (2, 3));
         assert_eq!((i.value(node(3, 2)), i.position(node(3, 2))), (23.0, DVec3::new(3.0, 7.0, 13.0)));
         assert!(i.value(node(0, 2)).is_nan());
-        let j = CurvilinearGrid::of_plane(&grid(), GridPlane::J(0), 0).unwrap();
+        let j = CurvilinearGrid::of_plane(&grid(), IndexPlane::Y(0), 0).unwrap();
         assert_eq!((j.n_columns(), j.n_rows(), j.value(node(1, 2))), (3, 1, 13.0));
-        let k = CurvilinearGrid::of_plane(&grid(), GridPlane::K(2), 0).unwrap();
+        let k = CurvilinearGrid::of_plane(&grid(), IndexPlane::Z(2), 0).unwrap();
         assert_eq!((k.n_columns(), k.n_rows(), k.value(node(2, 0))), (1, 2, 16.0));
     }
 
@@ -154,7 +124,7 @@ mod tests {
     #[test]
     fn faults_are_named() {
         let error = |plane, field| CurvilinearGrid::of_plane(&grid(), plane, field).unwrap_err().to_string();
-        assert_eq!(error(GridPlane::I(2), 0), "the plane i = 2; the grid has 2 nodes along i");
-        assert_eq!(error(GridPlane::I(1), 3), "field 3; the grid has 1");
+        assert_eq!(error(IndexPlane::X(2), 0), "the plane i = 2; the grid has 2 nodes along i");
+        assert_eq!(error(IndexPlane::X(1), 3), "field 3; the grid has 1");
     }
 }

@@ -4,7 +4,8 @@ use brickfield_core::glam::{DVec3, UVec3};
 
 use crate::{CellBox, CurvilinearGrid, CurvilinearGridError, CurvilinearVolume, Positions};
 
-/// All nodes with one index in common: the plane of nodes i = 3 is `X(3)`.
+/// All nodes with one index in common: the plane of nodes i = 3 is `X(3)`. Columns run along the next axis (x, y, z, x, ...), rows along the one after
+/// that.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs)]
 pub enum IndexPlane {
@@ -29,7 +30,8 @@ pub enum SurfaceError {
 }
 
 impl IndexPlane {
-    fn axis(self) -> usize {
+    /// The axis that it is across.
+    pub fn axis(self) -> usize {
         match self {
             IndexPlane::X(_) => 0,
             IndexPlane::Y(_) => 1,
@@ -37,9 +39,33 @@ impl IndexPlane {
         }
     }
 
-    fn node(self) -> u32 {
-        let (IndexPlane::X(node) | IndexPlane::Y(node) | IndexPlane::Z(node)) = self;
-        node
+    /// The axis as indices are named: i, j or k.
+    pub fn letter(self) -> char {
+        ['i', 'j', 'k'][self.axis()]
+    }
+
+    /// The index that all nodes have along it.
+    pub fn index(self) -> u32 {
+        let (IndexPlane::X(index) | IndexPlane::Y(index) | IndexPlane::Z(index)) = self;
+        index
+    }
+
+    /// The axes along columns and rows.
+    pub fn across(self) -> [usize; 2] {
+        [1, 2].map(|next| (self.axis() + next) % 3)
+    }
+
+    /// So many nodes along columns and rows, from `first` on, row by row.
+    pub(crate) fn nodes(self, first: UVec3, [n_columns, n_rows]: [u32; 2]) -> impl Iterator<Item = UVec3> + Clone {
+        let (axis, [column_axis, row_axis]) = (self.axis(), self.across());
+        let node = move |(column, row): (u32, u32)| {
+            let mut node = first;
+            node[axis] = self.index();
+            node[column_axis] += column;
+            node[row_axis] += row;
+            node
+        };
+        (0..n_rows).flat_map(move |row| (0..n_columns).map(move |column| (column, row))).map(node)
     }
 }
 
@@ -61,24 +87,14 @@ impl CellBox {
 impl CurvilinearVolume {
     /// A plane of nodes between some cells, as a grid of zones: a face of a zone of the octree, of the whole volume, or a slice.
     ///
-    /// `values` has one value for each node of the volume; NaN is a hole. Columns run along the axis after the plane's (x, y, z, x, ...), rows along
-    /// the one after that.
+    /// `values` has one value for each node of the volume; NaN is a hole.
     ///
     /// # Errors
     /// Not one value for each node, or infinite ones; no cells, or cells beyond the volume; a plane beyond the cells.
     pub fn surface(&self, values: &[f32], cells: &CellBox, plane: IndexPlane) -> Result<CurvilinearGrid, SurfaceError> {
         self.check(values, cells, plane)?;
-        let axis = plane.axis();
-        let (column_axis, row_axis) = ((axis + 1) % 3, (axis + 2) % 3);
-        let (n_columns, n_rows) = (cells.n[column_axis], cells.n[row_axis]);
-        let node = |row: u32, column: u32| {
-            let mut node = cells.first;
-            node[axis] = plane.node();
-            node[column_axis] += column;
-            node[row_axis] += row;
-            self.number(node)
-        };
-        let numbers = || (0..=n_rows).flat_map(|row| (0..=n_columns).map(move |column| node(row, column)));
+        let [n_columns, n_rows] = plane.across().map(|axis| cells.n[axis]);
+        let numbers = || plane.nodes(cells.first, [n_columns + 1, n_rows + 1]).map(|node| self.number(node));
         let positions: Vec<DVec3> = numbers().map(|i| self.positions()[i]).collect();
         let values = numbers().map(|i| values[i]).collect();
         Ok(CurvilinearGrid::new(n_rows, n_columns, Positions::Curvilinear(positions), values)?)
@@ -95,6 +111,6 @@ impl CurvilinearVolume {
             return Err(SurfaceError::Cells { first, end, n_cells });
         }
         let (first, last) = (first[plane.axis()], end[plane.axis()]);
-        if (first..=last).contains(&plane.node()) { Ok(()) } else { Err(SurfaceError::Plane { plane, first, last }) }
+        if (first..=last).contains(&plane.index()) { Ok(()) } else { Err(SurfaceError::Plane { plane, first, last }) }
     }
 }

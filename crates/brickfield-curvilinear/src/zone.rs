@@ -1,7 +1,7 @@
 //! What is stored of a coarse zone, and how it is found out.
 
-use brickfield_core::Aabb;
 use brickfield_core::glam::{DVec2, DVec3, Vec3};
+use brickfield_core::{Aabb, rounded_up};
 use rayon::prelude::*;
 
 use crate::chart::{Chart, DrawnZone, Quad, along_edge};
@@ -317,15 +317,13 @@ fn extension(grid: &CurvilinearGrid, quad: &Quad, scan: &Scan) -> Vec3 {
         Positions::Curvilinear(_) | Positions::Offsets { .. } => (scan.low, scan.high),
     };
     let inner = Aabb::of_points(quad.positions);
+    extension_to(&inner, low, high)
+}
+
+/// By how much a box must grow to all sides to hold another one.
+pub(crate) fn extension_to(inner: &Aabb, low: DVec3, high: DVec3) -> Vec3 {
     let beyond = (inner.min - low).max(high - inner.max);
     // The box is made by a sum, which rounds: room for that, too.
     let room = low.abs().max(high.abs()).max(inner.min.abs()).max(inner.max.abs()) * f64::EPSILON;
-    let along = |axis: usize| if beyond[axis] > 0.0 { rounded_up(beyond[axis] + room[axis]) } else { 0.0 };
-    Vec3::new(along(0), along(1), along(2))
-}
-
-/// The least f32 that is not below `x`.
-pub(crate) fn rounded_up(x: f64) -> f32 {
-    let nearest = x as f32;
-    if f64::from(nearest) < x { nearest.next_up() } else { nearest }
+    Vec3::from([0, 1, 2].map(|i| if beyond[i] > 0.0 { rounded_up(beyond[i] + room[i]) } else { 0.0 }))
 }

@@ -13,7 +13,7 @@ mod variant;
 pub use decoding::{DecodedTexels, Decoding, DecodingTask, decodings};
 pub use evaluate::{shader_inputs, shader_outputs};
 pub use library::{PatchError, ShaderLibrary};
-pub use passes::{n_rays_that_go_on, passes, rows_of_cells};
+pub use passes::{n_rays_that_go_on, passes, passes_of_cells};
 pub use pipelines::{Chosen, PipelineKey, Pipelines};
 pub use reflect::{Binding, BindingKind};
 pub use specialise::{Counts, ShaderError, Specialised, specialise};

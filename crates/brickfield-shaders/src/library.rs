@@ -27,8 +27,9 @@ const fn one_of(path: &'static str, name: &'static str, text: &'static str) -> M
     Module { name, path, text: Cow::Borrowed(text) }
 }
 
-const EMBEDDED: [Module; 29] = [
+const EMBEDDED: [Module; 30] = [
     own("frame", include_str!("wesl/frame.wesl")),
+    own("power", include_str!("wesl/power.wesl")),
     own("scalar", include_str!("wesl/scalar.wesl")),
     own("transfer", include_str!("wesl/transfer.wesl")),
     own("rays", include_str!("wesl/rays.wesl")),

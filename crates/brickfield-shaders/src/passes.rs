@@ -1,7 +1,5 @@
 //! How a frame is cut into dispatches: none takes long, no loop goes round too often, no sum grows too long.
 
-use std::ops::Range;
-
 use brickfield_frame::{CellsPlan, Division, FramePlan, Join, Pass, QuadratureRule, RenderError};
 
 use crate::KnotSearch;
@@ -38,11 +36,11 @@ pub fn n_rays_that_go_on(plan: &FramePlan, group_height: u32) -> u64 {
     u64::from(if plan.is_batch() { plan.size().y } else { rows }) * u64::from(plan.size().x)
 }
 
-/// The bands of rows of a picture of cells, each a dispatch.
+/// The dispatches of a picture of cells: bands of rows.
 ///
 /// # Errors
 /// Rays that may pass so many cells and segments that an invocation's loops would end without a word.
-pub fn rows_of_cells(plan: &CellsPlan) -> Result<Vec<Range<u32>>, RenderError> {
+pub fn passes_of_cells(plan: &CellsPlan) -> Result<Vec<Pass>, RenderError> {
     let n_cells = f64::from(plan.cells().n_cells().element_sum());
     let n_segments = 2.0 * plan.cells().radius() / plan.sampling().step_world();
     let rule = plan.sampling().rule();
@@ -58,7 +56,8 @@ pub fn rows_of_cells(plan: &CellsPlan) -> Result<Vec<Range<u32>>, RenderError> {
     let height = plan.size().y;
     let per_row = f64::from(plan.size().x) * (CELL_VALUES * n_cells + n_segments);
     let n_rows = ((MOST_VALUES / per_row) as u32 / CELL_ROWS).max(1).saturating_mul(CELL_ROWS);
-    Ok((0..height).step_by(n_rows as usize).map(|first| first..height.min(first.saturating_add(n_rows))).collect())
+    let band = |first: u32| Pass::whole_rays(first..height.min(first.saturating_add(n_rows)));
+    Ok((0..height).step_by(n_rows as usize).map(band).collect())
 }
 
 /// Rows of a workgroup.

@@ -6,7 +6,7 @@ use std::time::Instant;
 use brickfield_core::Image;
 use brickfield_core::glam::UVec2;
 use brickfield_frame::{
-    Backend, Cost, Description, Evaluate, Feature, Frame, FramePlan, FrameUniforms, RenderError, Resource,
+    Backend, Cost, Description, Evaluate, Feature, Frame, FramePlan, FrameUniforms, Pass, RenderError, Resource,
     SampleFormat, ShaderChoice, ShaderFunction, Target, Timing, check_memory, draw_batches,
 };
 use brickfield_shaders::{
@@ -101,26 +101,33 @@ impl WgpuBackend {
         Ok(())
     }
 
-    /// Runs the march over the picture, pass by pass; device and wall time in milliseconds.
-    fn march(
+    /// The passes of a plan, with room for what their rays have seen.
+    fn passes(&mut self, plan: &FramePlan, key: PipelineKey, is_first_batch: bool) -> Result<Vec<Pass>, RenderError> {
+        let pipeline = &self.pipelines[key];
+        let group_height = pipeline.workgroup_size[1];
+        if pipeline.uses(Resource::SeenBefore) {
+            let n_bytes = n_rays_that_go_on(plan, group_height) * size_of::<[f32; 4]>() as u64;
+            self.resources.buffer(Resource::SeenBefore).reserve(&self.device, n_bytes)?;
+        }
+        Ok(passes(plan, group_height, is_first_batch))
+    }
+
+    /// Runs the march over a picture of `width` pixels, pass by pass; device and wall time in milliseconds.
+    pub(crate) fn march(
         &mut self,
-        plan: &FramePlan,
+        width: u32,
         key: PipelineKey,
         uniforms: FrameUniforms,
-        is_first_batch: bool,
+        passes: &[Pass],
     ) -> Result<(Option<f64>, f64), RenderError> {
         let pipeline = &self.pipelines[key];
         let [x, y, _] = pipeline.workgroup_size;
-        if pipeline.uses(Resource::SeenBefore) {
-            let n_bytes = n_rays_that_go_on(plan, y) * size_of::<[f32; 4]>() as u64;
-            self.resources.buffer(Resource::SeenBefore).reserve(&self.device, n_bytes)?;
-        }
         let clock = self.clock.as_ref();
         let (mut device_ms, mut wall_ms) = (clock.map(|_| 0.0), 0.0);
-        for pass in passes(plan, y, is_first_batch) {
+        for pass in passes {
             let started = Instant::now();
-            let groups = [plan.size().x.div_ceil(x), (pass.rows.len() as u32).div_ceil(y), 1];
-            let uniforms = uniforms.in_pass(&pass);
+            let groups = [width.div_ceil(x), (pass.rows.len() as u32).div_ceil(y), 1];
+            let uniforms = uniforms.in_pass(pass);
             self.resources.buffer(Resource::Frame).write(&self.device, bytemuck::bytes_of(&uniforms))?;
             dispatch(&self.device, pipeline, &self.resources, groups, clock)?;
             self.device.wait("rendering")?;
@@ -198,7 +205,10 @@ impl WgpuBackend {
         self.device.wait("uploading")?;
         let upload_ms = milliseconds_since(started);
         let (device_ms, wall_ms) = match plan.proxy() {
-            None => self.march(plan, chosen.key, uniforms, is_first)?,
+            None => {
+                let passes = self.passes(plan, chosen.key, is_first)?;
+                self.march(plan.size().x, chosen.key, uniforms, &passes)?
+            }
             Some(proxy) => {
                 let drawing =
                     Drawing { device: &self.device, pipeline, resources: &self.resources, clock: self.clock.as_ref() };

@@ -60,8 +60,8 @@ fn from_shader(device: &wgpu::Device, shader: Specialised, target: Target) -> Pi
         source: wgpu::ShaderSource::Naga(Cow::Owned(shader.module)),
     });
     let program = match entry {
-        Entry::Proxy(_) => Program::Polygons(polygons(device, &pipeline_layout, &module, (entry, target))),
-        Entry::Mesh(_) => Program::Mesh(mesh(device, &pipeline_layout, &module, entry)),
+        Entry::Proxy(_) => Program::Polygons(triangles(device, &pipeline_layout, &module, (entry, target))),
+        Entry::Mesh(_) => Program::Mesh(triangles(device, &pipeline_layout, &module, (entry, Target::Float32))),
         Entry::March | Entry::Evaluate(_) | Entry::Probe(_) | Entry::Decode | Entry::Cells(_) => {
             Program::Compute(compute(device, &pipeline_layout, &module, label))
         }
@@ -85,7 +85,9 @@ fn compute(
     })
 }
 
-fn polygons(
+/// Triangles seen from both sides. Polygons have corners of their own, and are blended; the corners of a mesh the shader finds by their
+/// numbers, and of each pixel the nearest triangle stays.
+fn triangles(
     device: &wgpu::Device,
     layout: &wgpu::PipelineLayout,
     module: &wgpu::ShaderModule,
@@ -93,21 +95,30 @@ fn polygons(
 ) -> wgpu::RenderPipeline {
     let [vertex, fragment] = [0, 1].map(|i| Some(entry.entry_points()[i]));
     let compilation_options = wgpu::PipelineCompilationOptions::default;
+    let is_mesh = matches!(entry, Entry::Mesh(_));
+    let corners = Some(wgpu::VertexBufferLayout {
+        array_stride: size_of::<ProxyCorner>() as u64,
+        step_mode: wgpu::VertexStepMode::Vertex,
+        attributes: &wgpu::vertex_attr_array![0 => Float32x2, 1 => Float32, 2 => Uint32, 3 => Uint32],
+    });
+    let depths = wgpu::DepthStencilState {
+        format: DEPTH,
+        depth_write_enabled: Some(true),
+        depth_compare: Some(wgpu::CompareFunction::Greater),
+        stencil: wgpu::StencilState::default(),
+        bias: wgpu::DepthBiasState::default(),
+    };
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("polygons"),
+        label: Some(if is_mesh { "mesh" } else { "polygons" }),
         layout: Some(layout),
         vertex: wgpu::VertexState {
             module,
             entry_point: vertex,
             compilation_options: compilation_options(),
-            buffers: &[Some(wgpu::VertexBufferLayout {
-                array_stride: size_of::<ProxyCorner>() as u64,
-                step_mode: wgpu::VertexStepMode::Vertex,
-                attributes: &wgpu::vertex_attr_array![0 => Float32x2, 1 => Float32, 2 => Uint32, 3 => Uint32],
-            })],
+            buffers: if is_mesh { &[] } else { std::slice::from_ref(&corners) },
         },
         primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: None,
+        depth_stencil: is_mesh.then_some(depths),
         multisample: wgpu::MultisampleState::default(),
         fragment: Some(wgpu::FragmentState {
             module,
@@ -115,47 +126,9 @@ fn polygons(
             compilation_options: compilation_options(),
             targets: &[Some(wgpu::ColorTargetState {
                 format: format(target),
-                blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+                blend: (!is_mesh).then_some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
                 write_mask: wgpu::ColorWrites::ALL,
             })],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
-}
-
-/// Triangles seen from both sides, whose corners the shader finds by their numbers; of each pixel the nearest stays.
-fn mesh(
-    device: &wgpu::Device,
-    layout: &wgpu::PipelineLayout,
-    module: &wgpu::ShaderModule,
-    entry: Entry,
-) -> wgpu::RenderPipeline {
-    let [vertex, fragment] = [0, 1].map(|i| Some(entry.entry_points()[i]));
-    let compilation_options = wgpu::PipelineCompilationOptions::default;
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("mesh"),
-        layout: Some(layout),
-        vertex: wgpu::VertexState {
-            module,
-            entry_point: vertex,
-            compilation_options: compilation_options(),
-            buffers: &[],
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: DEPTH,
-            depth_write_enabled: Some(true),
-            depth_compare: Some(wgpu::CompareFunction::Greater),
-            stencil: wgpu::StencilState::default(),
-            bias: wgpu::DepthBiasState::default(),
-        }),
-        multisample: wgpu::MultisampleState::default(),
-        fragment: Some(wgpu::FragmentState {
-            module,
-            entry_point: fragment,
-            compilation_options: compilation_options(),
-            targets: &[Some(format(Target::Float32).into())],
         }),
         multiview_mask: None,
         cache: None,

@@ -65,38 +65,23 @@ pub fn surface_mesh(
 /// # Errors
 /// More triangles than a mesh may have.
 pub fn mesh_of(grid: &CurvilinearGrid, surrogate: &SurrogateMesh, normals: SurfaceNormals) -> Result<Mesh, MeshError> {
-    let mut parts = Parts::default();
-    parts.add(grid, surrogate, normals);
-    parts.mesh(normals)
+    let (triangles, normals) = (triangles(surrogate, 0).collect(), node_normals(grid, surrogate, normals));
+    Mesh::new(&surrogate.positions, &surrogate.values, normals.as_deref(), triangles)
 }
 
-/// Triangles of several grids.
-#[derive(Default)]
-struct Parts {
-    positions: Vec<DVec3>,
-    values: Vec<f32>,
-    normals: Vec<DVec3>,
-    triangles: Vec<MeshTriangle>,
+/// The triangles of a mesh, their corners counted from `first`.
+fn triangles(surrogate: &SurrogateMesh, first: u32) -> impl IndexedParallelIterator<Item = MeshTriangle> {
+    surrogate.triangles.par_iter().map(move |corners| MeshTriangle {
+        corners: corners.map(|corner| corner + first),
+        edges: outline(surrogate, *corners),
+    })
 }
 
-impl Parts {
-    fn add(&mut self, grid: &CurvilinearGrid, surrogate: &SurrogateMesh, normals: SurfaceNormals) {
-        let first = self.positions.len() as u32;
-        let triangle = |corners: &[u32; 3]| MeshTriangle {
-            corners: corners.map(|corner| corner + first),
-            edges: outline(surrogate, *corners),
-        };
-        self.triangles.par_extend(surrogate.triangles.par_iter().map(triangle));
-        if normals == SurfaceNormals::Grid {
-            self.normals.par_extend(surrogate.nodes.par_iter().map(|node| normal(grid, *node)));
-        }
-        self.positions.extend_from_slice(&surrogate.positions);
-        self.values.extend_from_slice(&surrogate.values);
-    }
-
-    fn mesh(self, normals: SurfaceNormals) -> Result<Mesh, MeshError> {
-        let normals = (normals == SurfaceNormals::Grid).then_some(self.normals.as_slice());
-        Mesh::new(&self.positions, &self.values, normals, self.triangles)
+/// The normals of a mesh's nodes, if they are asked for.
+fn node_normals(grid: &CurvilinearGrid, surrogate: &SurrogateMesh, normals: SurfaceNormals) -> Option<Vec<DVec3>> {
+    match normals {
+        SurfaceNormals::Triangles => None,
+        SurfaceNormals::Grid => Some(surrogate.nodes.par_iter().map(|node| normal(grid, *node)).collect()),
     }
 }
 
@@ -104,16 +89,26 @@ impl Parts {
 ///
 /// # Errors
 /// More triangles than a mesh may have.
-pub fn joined_mesh(grids: &[CurvilinearGrid], normals: SurfaceNormals) -> Result<Mesh, SurfaceError> {
-    let mut parts = Parts::default();
+pub fn joined_mesh(
+    grids: impl IntoIterator<Item = CurvilinearGrid>,
+    normals: SurfaceNormals,
+) -> Result<Mesh, SurfaceError> {
+    let (mut positions, mut values, mut all) = (Vec::new(), Vec::new(), Vec::new());
+    let mut of_nodes = (normals == SurfaceNormals::Grid).then(Vec::new);
     for grid in grids {
-        let tree = QuadTree::build(grid.clone());
+        let tree = QuadTree::build(grid);
         let finest = 0..tree.layout().n_zones(Level(0));
         let zones = finest.map(|i| tree.layout().zone_at(Level(0), i)).filter(|zone| tree.summary(*zone).is_nice());
         let selection = Selection::of_leaves(&tree, zones).expect("final zones without holes");
-        parts.add(grid, &surrogate_mesh(grid, &selection)?, normals);
+        let surrogate = surrogate_mesh(tree.grid(), &selection)?;
+        all.par_extend(triangles(&surrogate, positions.len() as u32));
+        if let (Some(of_nodes), Some(own)) = (&mut of_nodes, node_normals(tree.grid(), &surrogate, normals)) {
+            of_nodes.extend(own);
+        }
+        positions.extend(surrogate.positions);
+        values.extend(surrogate.values);
     }
-    Ok(parts.mesh(normals)?)
+    Ok(Mesh::new(&positions, &values, of_nodes.as_deref(), all)?)
 }
 
 /// The edges of a triangle that are parts of its zone's outline: only those stay within a row or a column of nodes.

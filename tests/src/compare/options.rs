@@ -96,7 +96,8 @@ pub fn parse(arguments: Vec<OsString>) -> Result<CompareArgs, clap::Error> {
     Ok(CompareArgs { rules, modes, default_camera, command, ..args })
 }
 
-fn each_once<T: Copy + PartialEq>(list: &[T]) -> Vec<T> {
+/// A list without its repetitions.
+pub(crate) fn each_once<T: Copy + PartialEq>(list: &[T]) -> Vec<T> {
     let is_first = |(i, x): &(usize, &T)| !list[..*i].contains(x);
     list.iter().enumerate().filter(is_first).map(|(_, x)| *x).collect()
 }

@@ -149,8 +149,7 @@ impl PreparedCells {
             Some(Ok(image)) => image,
         };
         let mut verdict = self.tolerance.judge(&image, &self.reference.image);
-        let empty = self.tolerance.is_empty_promise().filter(|_| mutant.is_none());
-        verdict.complaint = verdict.complaint.or(empty.map(|bound| Complaint::EmptyPromise { bound }));
+        verdict.complaint = verdict.complaint.or_else(|| self.tolerance.empty_promise(mutant));
         Judged::Picture(image, verdict)
     }
 

@@ -228,12 +228,11 @@ fn run_picture(
         Some(Ok(image)) => image,
     };
     let mut verdict = tolerance.judge(&image, &reference.image);
-    let empty = || tolerance.is_empty_promise().map(|bound| Complaint::EmptyPromise { bound });
     // Rules of thumb that hold whatever the reference says; a mutant is caught by them, too.
     verdict.complaint = verdict
         .complaint
         .or_else(|| bounded(&image, &plans.replayed, reference))
-        .or_else(|| empty().filter(|_| mutant.is_none()));
+        .or_else(|| tolerance.empty_promise(mutant));
     Judged::Picture(image, verdict)
 }
 

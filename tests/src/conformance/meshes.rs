@@ -94,9 +94,8 @@ impl PreparedMesh {
         let n_bare = image.pixels().iter().filter(|pixel| pixel[3] == 0.0).count();
         let cracks = Complaint::Cracks { n_bare, n_pixels: image.pixels().len() };
         let has_cracks = self.test.covers == Covers::Everything && n_bare > 0;
-        let empty = self.tolerance.is_empty_promise().filter(|_| mutant.is_none());
         verdict.complaint =
-            verdict.complaint.or(has_cracks.then_some(cracks)).or(empty.map(|bound| Complaint::EmptyPromise { bound }));
+            verdict.complaint.or(has_cracks.then_some(cracks)).or_else(|| self.tolerance.empty_promise(mutant));
         Judged::Picture(image, verdict)
     }
 

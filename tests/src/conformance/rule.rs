@@ -24,6 +24,7 @@ use brickfield_core::glam::UVec2;
 use brickfield_core::{Image, TransferFunction};
 use brickfield_optics::Shade;
 
+use super::case::Mutant;
 use crate::metrics::{Errors, MetricError, errors, quantile};
 
 /// The share of pixels that must be within the narrow bound.
@@ -142,6 +143,12 @@ impl Tolerance {
     pub fn is_empty_promise(&self) -> Option<f64> {
         let bound = quantile(self.most.clone(), 0.75);
         (bound > EMPTY_PROMISE).then_some(bound)
+    }
+
+    /// The complaint about such a bound; a mutant is not to be caught by it.
+    pub(super) fn empty_promise(&self, mutant: Option<&Mutant>) -> Option<Complaint> {
+        let bound = mutant.is_none().then(|| self.is_empty_promise())??;
+        Some(Complaint::EmptyPromise { bound })
     }
 
     /// Holds a picture against its reference.

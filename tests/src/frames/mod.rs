@@ -13,22 +13,21 @@
 mod report;
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use brickfield::core::Camera;
 use brickfield::core::glam::{DQuat, DVec3};
-use brickfield::frame::{Backend, Mode, RenderError};
+use brickfield::frame::{Backend, Mode};
 use brickfield::io::Opened;
 use brickfield::optics::QuadratureRule;
 use brickfield::options::{InputOptions, OptionError, Subject, TreeOptions, ViewOptions, values};
-use brickfield::{PrepareError, Residency, Scene, Skipping, prepare};
+use brickfield::{Residency, Scene, Skipping};
 use clap::Parser;
 
 use crate::compare::rivals::Rivals;
-use crate::compare::{CompareError, RivalArgs};
+use crate::compare::{CompareError, RivalArgs, each_once};
 use crate::memory::{cpu_seconds, peak, restart_peak};
 use crate::report::{Machine, commit};
-use crate::turns::{Spread, take_turns};
+use crate::turns::{FrameError, Spread, take_turns, tree_frame};
 
 pub use report::{FrameTimes, FramesReport, Phase, Series, table};
 
@@ -89,9 +88,7 @@ pub enum FramesError {
     #[error(transparent)]
     Compare(Box<CompareError>),
     #[error(transparent)]
-    Prepare(#[from] PrepareError),
-    #[error("{backend}: {source}")]
-    Render { backend: &'static str, source: RenderError },
+    Frame(#[from] FrameError),
 }
 
 impl From<OptionError> for FramesError {
@@ -111,8 +108,8 @@ impl FramesError {
     pub fn status(&self) -> u8 {
         match self {
             FramesError::Compare(e) => e.status(),
-            FramesError::Prepare(_) => 2,
-            FramesError::Render { .. } => 1,
+            FramesError::Frame(FrameError::Prepare(_)) => 2,
+            FramesError::Frame(_) => 1,
         }
     }
 }
@@ -147,15 +144,12 @@ pub fn frames(args: &FramesArgs) -> Result<FramesReport, FramesError> {
     let scene = scene(args, &subject)?;
     let mut contestants = contestants(args, &scene, present.len());
     let mut residencies: Vec<Residency> = present.iter().map(|_| Residency::default()).collect();
-    let mut n_drawn = 0;
+    let middle = subject.volume.grid().world_box().center();
     take_turns(contestants.len(), WARM_UP + args.frames, |turn| {
-        let n_contestants = contestants.len();
-        let round = n_drawn / n_contestants;
-        n_drawn += 1;
         let contestant = &mut contestants[turn.contestant];
-        let camera = turned(&scene.camera, centre(&subject), args.turn * round as f64);
+        let camera = turned(&scene.camera, middle, args.turn * f64::from(turn.round));
         let backend = present[contestant.backend].as_mut();
-        contestant.frame(&subject, camera, backend, &mut residencies[contestant.backend], round)
+        contestant.frame(&subject, camera, backend, &mut residencies[contestant.backend], turn.round)
     })?;
     Ok(FramesReport {
         file: args.file.display().to_string(),
@@ -182,8 +176,7 @@ fn scene(args: &FramesArgs, subject: &Subject) -> Result<Scene, FramesError> {
 }
 
 fn contestants(args: &FramesArgs, scene: &Scene, n_backends: usize) -> Vec<Contestant> {
-    let mut modes: Vec<Mode> = Vec::new();
-    args.modes.iter().for_each(|mode| modes.extend((!modes.contains(mode)).then_some(*mode)));
+    let modes = each_once(&args.modes);
     let of = |(backend, mode)| Contestant {
         backend,
         scene: Scene { mode, ..scene.clone() },
@@ -203,30 +196,27 @@ impl Contestant {
         camera: Camera,
         backend: &mut dyn Backend,
         residency: &mut Residency,
-        round: usize,
+        round: u32,
     ) -> Result<f64, FramesError> {
         self.scene.camera = camera;
         restart_peak();
-        let (begin, cpu) = (Instant::now(), cpu_seconds());
-        let plan = prepare(&subject.tree, &self.scene, residency)?;
-        let prepare_ms = begin.elapsed().as_secs_f64() * 1e3;
-        let name = backend.describe().backend;
-        let frame = backend.render(&plan).map_err(|source| FramesError::Render { backend: name, source })?;
+        let cpu = cpu_seconds();
+        let frame = tree_frame(&subject.tree, &self.scene, residency, backend)?;
         let times = FrameTimes {
-            prepare_ms,
+            prepare_ms: frame.prepare_ms,
             upload_ms: frame.timing.upload_ms,
             render_ms: frame.timing.wall_ms,
             device_ms: frame.timing.device_ms,
             read_back_ms: frame.timing.read_back_ms,
-            whole_ms: begin.elapsed().as_secs_f64() * 1e3,
+            whole_ms: frame.ms,
             uploaded_bytes: frame.uploaded_bytes,
-            n_bricks: plan.field().slots().n_filled(),
+            n_bricks: frame.plan.field().slots().n_filled(),
         };
         let taken = cpu_seconds().zip(cpu).map(|(after, before)| after - before);
         self.peak_bytes = self.peak_bytes.max(peak());
         match round {
             0 => self.first = Some(times),
-            _ if round > WARM_UP as usize => {
+            _ if round > WARM_UP => {
                 self.timed.push(times);
                 self.cpu_seconds = self.cpu_seconds.zip(taken).map(|(sum, own)| sum + own);
             }
@@ -253,11 +243,6 @@ impl Contestant {
             frames: self.timed,
         }
     }
-}
-
-fn centre(subject: &Subject) -> DVec3 {
-    let grid = subject.volume.grid();
-    grid.index_to_world().transform_point3(grid.dims().as_dvec3() / 2.0)
 }
 
 /// A camera that has gone around a point, about its own axis upwards.

@@ -174,7 +174,7 @@ fn in_turns(
 ) -> Vec<Times> {
     let (begin, third) = (Instant::now(), deadline.share(1.0 / 3.0));
     entrants.retain_mut(|entrant| {
-        let warm_up = Turn { contestant: 0, warm_up: true, again: false };
+        let warm_up = Turn { contestant: 0, round: 0, again: false };
         let what = format!("{}, {}", entrant.what, backends[entrant.backend].0);
         let taken = third.admit(&what, 0.0).and_then(|()| entrant.take(warm_up, backends));
         taken.map_err(|e| left_out.push(e)).is_ok()
@@ -185,7 +185,7 @@ fn in_turns(
     let mut before = None;
     for round in 0..n_rounds {
         for contestant in order(round, entrants.len()) {
-            let turn = Turn { contestant, warm_up: false, again: before == Some(contestant) };
+            let turn = Turn { contestant, round: round + 1, again: before == Some(contestant) };
             match entrants[contestant].take(turn, backends) {
                 Ok(ms) => times[contestant].push(ms),
                 Err(e) => left_out.push(e),

@@ -16,7 +16,7 @@ use super::report::{Steady, TextureRate, VolumeInfo};
 use super::texture::{Reading, texture_rate};
 use super::{Form, PartResult};
 use crate::memory::{available, gigabytes, peak};
-use crate::turns::{Spread, order};
+use crate::turns::{Spread, TimedFrame, order, tree_frame};
 use crate::volumes::{phantom_camera, phantom_transfer};
 
 /// Least and most timed frames.
@@ -264,16 +264,9 @@ fn frame(
     backend: &mut (impl Backend + ?Sized),
     residency: &mut Residency,
 ) -> Result<(FrameTimes, FramePlan), String> {
-    let begin = Instant::now();
-    let plan = prepare(&made.tree, scene, residency).map_err(|e| e.to_string())?;
-    let prepare_ms = milliseconds_since(begin);
-    let timing = backend.render(&plan).map_err(|e| e.to_string())?.timing;
-    let times = FrameTimes { prepare_ms, whole_ms: milliseconds_since(begin), timing };
-    Ok((times, plan))
-}
-
-fn milliseconds_since(begin: Instant) -> f64 {
-    begin.elapsed().as_secs_f64() * 1e3
+    let TimedFrame { plan, prepare_ms, ms, timing, .. } =
+        tree_frame(&made.tree, scene, residency, backend).map_err(|e| e.to_string())?;
+    Ok((FrameTimes { prepare_ms, whole_ms: ms, timing }, plan))
 }
 
 impl Series<'_> {

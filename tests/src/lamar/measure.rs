@@ -73,7 +73,7 @@ pub(super) fn duel(
     let (mut latest, mut prepare_ms) = ([None, None], [Vec::new(), Vec::new()]);
     let ms = take_turns::<PaperError>(2, n_rounds, |turn| {
         let frame = contestants[turn.contestant].take(turn, backend)?;
-        if !turn.warm_up {
+        if !turn.warms_up() {
             prepare_ms[turn.contestant].push(frame.prepare_ms);
         }
         let frame_ms = frame.ms;

@@ -115,7 +115,7 @@ fn contest(
     let mut uploaded = vec![0; contestants.len()];
     let ms = take_turns::<PaperError>(contestants.len(), args.common.frames, |turn| {
         let frame = contestants[turn.contestant].take(turn, backend)?;
-        if turn.warm_up {
+        if turn.warms_up() {
             uploaded[turn.contestant] = frame.uploaded_bytes;
         }
         pictures[turn.contestant] = Some(frame.image);

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use brickfield::bricks::{BlockSource, BrickTree};
-use brickfield::frame::{Backend, FramePlan, RenderError};
+use brickfield::frame::{Backend, FramePlan, RenderError, Timing};
 use brickfield::{
     BlockResidency, BlockStyle, PrepareBlocksError, PrepareError, PrepareTrimmedError, Residency, Scene, TrimResidency,
     TrimmedVolume, Trimming, prepare, prepare_blocks, prepare_trimmed,
@@ -35,6 +35,8 @@ pub struct TimedFrame {
     pub prepare_ms: f64,
     /// From the scene to the picture.
     pub ms: f64,
+    /// The backend's part of it.
+    pub timing: Timing,
     /// Bytes that were brought to the device.
     pub uploaded_bytes: u64,
 }
@@ -86,11 +88,7 @@ impl<'a> Contestant<'a> {
                 prepare_trimmed(volume, &self.scene, *trimming, residency)?
             }
         };
-        let prepare_ms = milliseconds_since(begin);
-        let name = backend.describe().backend;
-        let rendered = backend.render(&plan).map_err(|source| FrameError::Render { backend: name, source })?;
-        let (ms, uploaded_bytes) = (milliseconds_since(begin), rendered.uploaded_bytes);
-        Ok(TimedFrame { ms, plan, image: rendered.image, prepare_ms, uploaded_bytes })
+        rendered(begin, plan, backend)
     }
 
     /// Takes a turn. The bricks are resident in a timed one: unless the turn before was this contestant's, a frame that is not
@@ -99,11 +97,34 @@ impl<'a> Contestant<'a> {
     /// # Errors
     /// As [`Contestant::frame`].
     pub fn take(&mut self, turn: Turn, backend: &mut dyn Backend) -> Result<TimedFrame, FrameError> {
-        if !turn.warm_up && !turn.again {
+        if !turn.warms_up() && !turn.again {
             self.frame(backend)?;
         }
         self.frame(backend)
     }
+}
+
+/// A frame of a scene of a tree, whose bricks have the slots of `residency`.
+///
+/// # Errors
+/// A scene that is refused, a backend that fails.
+pub fn tree_frame(
+    tree: &BrickTree,
+    scene: &Scene,
+    residency: &mut Residency,
+    backend: &mut (impl Backend + ?Sized),
+) -> Result<TimedFrame, FrameError> {
+    let begin = Instant::now();
+    rendered(begin, prepare(tree, scene, residency)?, backend)
+}
+
+/// Renders a plan that was being prepared since `begin`.
+fn rendered(begin: Instant, plan: FramePlan, backend: &mut (impl Backend + ?Sized)) -> Result<TimedFrame, FrameError> {
+    let prepare_ms = milliseconds_since(begin);
+    let name = backend.describe().backend;
+    let frame = backend.render(&plan).map_err(|source| FrameError::Render { backend: name, source })?;
+    let (ms, timing, uploaded_bytes) = (milliseconds_since(begin), frame.timing, frame.uploaded_bytes);
+    Ok(TimedFrame { plan, image: frame.image, prepare_ms, ms, timing, uploaded_bytes })
 }
 
 fn milliseconds_since(begin: Instant) -> f64 {

@@ -15,7 +15,7 @@ mod ratio;
 mod server;
 
 pub use claim::{Bound, Claim, Claims};
-pub use contestant::{Contestant, FrameError, TimedFrame};
+pub use contestant::{Contestant, FrameError, TimedFrame, tree_frame};
 pub use ratio::{CONFIDENCE, Ratio, Spread, Standing};
 pub use server::{Offer, Server, ServerError, serve};
 
@@ -24,10 +24,17 @@ pub use server::{Offer, Server, ServerError, serve};
 pub struct Turn {
     /// Whose turn it is, counted from 0.
     pub contestant: usize,
-    /// Whether the turn is in the first round, which is not timed.
-    pub warm_up: bool,
+    /// The round, from 0.
+    pub round: u32,
     /// Whether the turn before was the same contestant's: the backend still has its bricks.
     pub again: bool,
+}
+
+impl Turn {
+    /// Whether the turn is in the first round, which is not timed.
+    pub fn warms_up(&self) -> bool {
+        self.round == 0
+    }
 }
 
 /// The contestants in the order of a round: forwards in even rounds, backwards in odd ones.
@@ -49,7 +56,7 @@ pub fn take_turns<E>(
     let mut before = None;
     for round in 0..=n_rounds {
         for contestant in order(round, n_contestants) {
-            let ms = turn(Turn { contestant, warm_up: round == 0, again: before == Some(contestant) })?;
+            let ms = turn(Turn { contestant, round, again: before == Some(contestant) })?;
             before = Some(contestant);
             if round > 0 {
                 times[contestant].push(ms);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use brickfield::curvilinear::{CurvilinearGrid, GridPlane};
+use brickfield::curvilinear::{CurvilinearGrid, IndexPlane};
 use brickfield::frame::{
     Backend, Cells, CellsPlan, CellsView, Coloring, MeshLines, MeshPlan, MeshView, Mode, QuadratureRule, RenderError,
     Sampling,
@@ -13,13 +13,13 @@ use brickfield::io::{GridOptions, open_grid};
 use brickfield::optics::Preset;
 use brickfield::{SurfaceNormals, joined_mesh, spectrum};
 use brickfield_core::glam::{DVec3, UVec2};
-use brickfield_core::{Aabb, Camera, Image, StructuredGrid, ValueRange};
+use brickfield_core::{Camera, Image, StructuredGrid, ValueRange};
 use serde::Serialize;
 
 use super::WynnArgs;
 use crate::compare::rivals::Rivals;
 use crate::memory::cpu_seconds;
-use crate::metrics::{greatest_difference, median};
+use crate::metrics::{greatest_difference, median, share_beyond};
 use crate::paper::{Missed, PaperError, data_sets, print};
 
 /// A grid of PLOT3D, as paths below the folder of real data.
@@ -61,10 +61,10 @@ struct CellsRow {
 struct Subject {
     name: String,
     vtk: [f64; 2],
-    grid: StructuredGrid,
+    camera: Camera,
+    /// The surfaces.
+    planes: MeshPlan,
     cells: Arc<Cells>,
-    range: ValueRange,
-    around: Aabb,
 }
 
 /// Whether the data are there.
@@ -82,10 +82,10 @@ pub(super) fn run(args: &WynnArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, P
     let (mut rows, mut missed) = (Vec::new(), Vec::new());
     for files in files(args)? {
         let subject = Subject::open(files)?;
-        let n = subject.cells.n_cells();
+        let (n, range) = (subject.cells.n_cells(), subject.cells.range());
         print(&format!(
             "{}: {} x {} x {} cells, {} to {}; VTK: ray cast {} s, projected tetrahedra {} s of CPU",
-            subject.name, n.x, n.y, n.z, subject.range.min, subject.range.max, subject.vtk[0], subject.vtk[1]
+            subject.name, n.x, n.y, n.z, range.min, range.max, subject.vtk[0], subject.vtk[1]
         ))?;
         for picture in Picture::ALL {
             let mut first: Option<Image<f32>> = None;
@@ -161,8 +161,9 @@ impl Subject {
         options.solution = Some(files.values);
         let grid = open_grid(&files.grid, &options)?.grids.swap_remove(0);
         let cells = Arc::new(Cells::of_grid(&grid, 0)?);
-        let (range, around) = (cells.range(), cells.extent());
-        Ok(Subject { name: files.name, vtk: files.vtk, grid, range, around, cells })
+        let camera = Camera::framing(&cells.extent(), DVec3::new(0.6, -1.0, 0.5), DVec3::Z)?;
+        let planes = planes(&grid, cells.range(), camera)?;
+        Ok(Subject { name: files.name, vtk: files.vtk, camera, planes, cells })
     }
 
     fn draw(
@@ -172,21 +173,19 @@ impl Subject {
         backend: &mut dyn Backend,
         first: Option<&Image<f32>>,
     ) -> Result<(Image<f32>, CellsRow), PaperError> {
-        let camera = Camera::framing(&self.around, DVec3::new(0.6, -1.0, 0.5), DVec3::Z)?;
         let name = backend.describe().backend;
-        let mesh = self.planes(camera)?;
         let fault = |source: RenderError| PaperError::Render { backend: name, source };
         let (mut ms, mut seconds, mut image) = (Vec::new(), Vec::new(), None);
         for _ in 0..=args.common.frames {
             let (begin, cpu) = (Instant::now(), cpu_seconds());
             let behind = match picture {
                 Picture::Volume => None,
-                Picture::Surfaces | Picture::Both => Some(backend.render_mesh(&mesh).map_err(fault)?),
+                Picture::Surfaces | Picture::Both => Some(backend.render_mesh(&self.planes).map_err(fault)?),
             };
             image = Some(match (picture, behind) {
                 (Picture::Surfaces, Some(frame)) => frame.image(),
                 (_, behind) => {
-                    let plan = self.volume(camera, behind.map(|frame| Arc::new(frame.pixels)))?;
+                    let plan = self.volume(behind.map(|frame| Arc::new(frame.pixels)))?;
                     backend.render_cells(&plan).map_err(fault)?.image
                 }
             });
@@ -194,9 +193,6 @@ impl Subject {
             seconds.extend(cpu_seconds().zip(cpu).map(|(after, before)| after - before));
         }
         let image = image.expect("at least one frame");
-        let differs = |(a, b): (&[f32; 4], &[f32; 4])| (0..4).any(|c| f64::from((a[c] - b[c]).abs()) > ROUNDING);
-        let n_differing =
-            |first: &Image<f32>| first.pixels().iter().zip(image.pixels()).filter(|p| differs(*p)).count();
         let row = CellsRow {
             data: self.name.clone(),
             picture: picture.name(),
@@ -204,36 +200,38 @@ impl Subject {
             ms: median(ms.split_off(1)),
             cpu_seconds: (seconds.len() > 1).then(|| median(seconds.split_off(1))),
             difference: first.map_or(0.0, |first| greatest_difference(first, &image)),
-            differing: first.map_or(0.0, |first| n_differing(first) as f64 / image.pixels().len() as f64),
+            differing: first.map_or(0.0, |first| share_beyond(first, &image, ROUNDING)),
         };
         Ok((image, row))
     }
 
-    /// The planes at a third of the grid along i and k, with their outlines.
-    fn planes(&self, camera: Camera) -> Result<MeshPlan, PaperError> {
-        let n = self.grid.n_nodes();
-        let planes = [GridPlane::I(n.x / 3), GridPlane::K(n.z / 3)];
-        let grids = planes.map(|plane| CurvilinearGrid::of_plane(&self.grid, plane, 0).expect("a plane of the grid"));
-        let view = MeshView {
-            camera,
-            size: SIZE,
-            colors: spectrum(self.range).expect("values are finite"),
-            coloring: Coloring::Values,
-            light: None,
-            lines: Some(MeshLines { width: 0.7, color: [0.0; 3] }),
-        };
-        let mesh = joined_mesh(&grids, SurfaceNormals::Triangles)?;
-        Ok(MeshPlan::new(Arc::new(mesh), view).expect("a picture has pixels, and lines have a width"))
-    }
-
-    fn volume(&self, camera: Camera, behind: Option<Arc<Image<f32>>>) -> Result<CellsPlan, PaperError> {
-        let length = self.around.diagonal();
-        let transfer =
-            Preset::from_name("linear").expect("a preset").transfer(self.range, length).expect("a finite range");
+    fn volume(&self, behind: Option<Arc<Image<f32>>>) -> Result<CellsPlan, PaperError> {
+        let length = self.cells.extent().diagonal();
+        let transfer = Preset::from_name("linear")
+            .expect("a preset")
+            .transfer(self.cells.range(), length)
+            .expect("a finite range");
         let sampling = Sampling::new(length / STEPS, QuadratureRule::MidpointExponential, Mode::Exact).expect("a step");
-        let view = CellsView { camera, size: SIZE, sampling, transfer, behind };
+        let view = CellsView { camera: self.camera, size: SIZE, sampling, transfer, behind };
         Ok(CellsPlan::new(Arc::clone(&self.cells), view)?)
     }
+}
+
+/// The planes at a third of the grid along i and k, with their outlines.
+fn planes(grid: &StructuredGrid, range: ValueRange, camera: Camera) -> Result<MeshPlan, PaperError> {
+    let n = grid.n_nodes();
+    let planes = [IndexPlane::X(n.x / 3), IndexPlane::Z(n.z / 3)];
+    let grids = planes.map(|plane| CurvilinearGrid::of_plane(grid, plane, 0).expect("a plane of the grid"));
+    let view = MeshView {
+        camera,
+        size: SIZE,
+        colors: spectrum(range).expect("values are finite"),
+        coloring: Coloring::Values,
+        light: None,
+        lines: Some(MeshLines { width: 0.7, color: [0.0; 3] }),
+    };
+    let mesh = joined_mesh(grids, SurfaceNormals::Triangles)?;
+    Ok(MeshPlan::new(Arc::new(mesh), view).expect("a picture has pixels, and lines have a width"))
 }
 
 fn line(row: &CellsRow, vtk: [f64; 2]) -> String {

@@ -44,9 +44,14 @@ impl Terrain {
     }
 
     pub(super) fn new(name: String, grid: CurvilinearGrid) -> Terrain {
-        let range = range_of(grid.values());
+        let range = grid.range().unwrap_or(ValueRange { min: 0.0, max: 0.0 });
         let colors = spectrum(range).expect("values are finite");
         Terrain { name, tree: Arc::new(QuadTree::build(grid)), range, colors }
+    }
+
+    /// The name in names of pictures.
+    pub(super) fn stem(&self) -> String {
+        self.name.rsplit('/').next().unwrap_or(&self.name).replace('.', "-")
     }
 
     /// An error in per cent of the values' range.
@@ -57,7 +62,7 @@ impl Terrain {
     /// All of it from above, by parallel rays, in a square picture; `zoom` times as large, its middle in the middle.
     pub(super) fn seen_from_above(&self, size: UVec2, zoom: f64) -> Result<View, PaperError> {
         let extent = self.tree.extent(self.tree.layout().root());
-        let (middle, around) = (extent.center(), extent.max - extent.min);
+        let (middle, around) = (extent.center(), extent.extent());
         let height = around.x.max(around.y) * 1.02 / zoom;
         let eye = middle + DVec3::Z * around.length();
         let camera = Camera::look_at(eye, middle, DVec3::Y, Projection::Orthographic { height })?;
@@ -95,10 +100,4 @@ pub(super) fn timed_frame(
     let name = backend.describe().backend;
     let frame = backend.render_mesh(&plan).map_err(|source| PaperError::Render { backend: name, source })?;
     Ok((plan, frame, begin.elapsed().as_secs_f64()))
-}
-
-/// The range of values that are no holes.
-pub(super) fn range_of(values: &[f32]) -> ValueRange {
-    let values = || values.iter().filter(|v| !v.is_nan()).map(|v| f64::from(*v));
-    ValueRange { min: values().fold(f64::INFINITY, f64::min), max: values().fold(f64::NEG_INFINITY, f64::max) }
 }

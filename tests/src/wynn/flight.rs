@@ -168,7 +168,7 @@ fn busy(time: Duration) {
 /// The view of a frame.
 fn seen(args: &WynnArgs, terrain: &Terrain, i: u32) -> Result<View, PaperError> {
     let extent = terrain.tree.extent(terrain.tree.layout().root());
-    let (around, n) = (extent.max - extent.min, f64::from(args.flight_frames));
+    let (around, n) = (extent.extent(), f64::from(args.flight_frames));
     let way = f64::from(i) / n;
     // Behind two thirds of the way the flight goes on somewhere else.
     let lane = if way < 2.0 / 3.0 { 0.3 } else { 0.7 };

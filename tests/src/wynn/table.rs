@@ -151,7 +151,7 @@ fn line(row: &TableRow) -> String {
 /// Figures 11 to 14: the terrain with the paper's numbers of polygons, drawn by the first backend.
 fn picture(args: &WynnArgs, terrain: &Terrain, view: &View, rivals: &mut Rivals) -> Result<(), PaperError> {
     let Some(backend) = rivals.present.first_mut() else { return Ok(()) };
-    let stem = terrain.name.rsplit('/').next().unwrap_or(&terrain.name).replace('.', "-");
+    let stem = terrain.stem();
     for (_, n_polygons, _) in PAPER {
         let mut selector = BudgetSelector::new(Arc::clone(&terrain.tree));
         selector.update(view, n_polygons);

@@ -8,7 +8,7 @@ use brickfield_core::Image;
 use super::WynnArgs;
 use super::data::{terrains, timed_frame};
 use crate::compare::rivals::Rivals;
-use crate::metrics::{greatest_difference, median};
+use crate::metrics::{greatest_difference, median, share_beyond};
 use crate::paper::{Missed, PaperError, print};
 
 /// The paper's numbers of zones, and their error in %.
@@ -52,9 +52,8 @@ pub(super) fn run(args: &WynnArgs, rivals: &mut Rivals) -> Result<Vec<Missed>, P
         for (name, other) in others {
             missed.extend(other_picture(&terrain.name, name, first, other)?);
         }
-        let stem = terrain.name.rsplit('/').next().unwrap_or(&terrain.name).replace('.', "-");
         args.common.write_picture(
-            &format!("wynn-zoom-{stem}"),
+            &format!("wynn-zoom-{}", terrain.stem()),
             first,
             &format!("{}, six times as large", terrain.name),
         )?;
@@ -68,9 +67,7 @@ fn other_picture(
     first: &Image<f32>,
     other: &Image<f32>,
 ) -> Result<Option<Missed>, PaperError> {
-    let differs = |(a, b): (&[f32; 4], &[f32; 4])| (0..4).any(|c| f64::from((a[c] - b[c]).abs()) > ROUNDING);
-    let n = first.pixels().iter().zip(other.pixels()).filter(|pair| differs(*pair)).count();
-    let share = n as f64 / first.pixels().len() as f64;
+    let share = share_beyond(first, other, ROUNDING);
     print(&format!(
         "  {backend}: greatest difference from the first backend {:.1e}, {:.3} % of pixels above {ROUNDING:.0e}",
         greatest_difference(first, other),

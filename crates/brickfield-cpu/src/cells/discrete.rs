@@ -32,7 +32,7 @@ impl DiscreteCells {
 /// The sum that a plan of cells asks for, in f64.
 ///
 /// No ray ends early, and no cell is jumped over. Accuracy: that of f64; positions of nodes are the plan's, rounded to f32. Cost: about 1 us a
-/// cell and core, five rays for each pixel.
+/// cell and core, nine rays for each pixel.
 pub fn discrete_cells(plan: &CellsPlan) -> DiscreteCells {
     let (size, reference) = (plan.size(), Reference::new(plan));
     let row = |y: u32| (0..size.x).map(|x| reference.pixel(x, y)).collect::<Vec<_>>();

@@ -67,10 +67,9 @@ impl<'a, L: Lanes> March<'a, L> {
         let plan = self.scene.plan;
         let (ray, end) = (plan.rays().ray(at.x, at.y), plan.end(at.x, at.y));
         let mut state = Ray32::default();
-        if self.faces.is_empty() {
-            return super::over(&state, end.map(|(color, _)| color));
+        if !self.faces.is_empty() {
+            self.ray(at, &ray, end.map_or(f64::INFINITY, |(_, t)| f64::from(t)), &mut state);
         }
-        self.ray(at, &ray, end.map_or(f64::INFINITY, |(_, t)| f64::from(t)), &mut state);
         super::over(&state, end.map(|(color, _)| color))
     }
 

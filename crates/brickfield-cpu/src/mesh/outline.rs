@@ -20,6 +20,11 @@ impl Corners {
         let vertices = plan.mesh().triangles()[triangle as usize].corners;
         Corners { triangle, vertices, positions: vertices.map(|vertex| plan.mesh().position(vertex)) }
     }
+
+    /// The corners' positions, mixed.
+    pub(super) fn point(&self, weights: [f64; 3]) -> DVec3 {
+        self.positions.iter().zip(weights).map(|(p, w)| *p * w).sum()
+    }
 }
 
 /// The edges of a triangle as lines of the picture, and the box around the part of it that lies before the eye.
@@ -127,8 +132,7 @@ impl Outline {
     pub(super) fn depth_in_plane(&self, plan: &MeshPlan, corners: &Corners, position: DVec2) -> f64 {
         let volumes = self.edges.map(|edge| edge.at(position));
         let sum: f64 = volumes.iter().sum();
-        let point: DVec3 = corners.positions.iter().zip(volumes).map(|(p, v)| *p * (v / sum)).sum();
-        plan.rays().camera(point).z
+        plan.rays().camera(corners.point(volumes.map(|v| v / sum))).z
     }
 
     /// Where the ray of a position meets the triangle, or its nearest point in the picture; `None` before the nearest depth that is drawn.
@@ -136,7 +140,7 @@ impl Outline {
         let volumes = self.edges.map(|edge| edge.at(position).max(0.0));
         let sum: f64 = volumes.iter().sum();
         let weights = if sum > 0.0 { volumes.map(|v| v / sum) } else { [1.0, 0.0, 0.0] };
-        let point: DVec3 = corners.positions.iter().zip(weights).map(|(p, w)| *p * w).sum();
+        let point = corners.point(weights);
         let depth = plan.rays().camera(point).z;
         let distance = (point - plan.rays().eye()).length();
         let distance = if plan.rays().are_parallel() { depth } else { distance };

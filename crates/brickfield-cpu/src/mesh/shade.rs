@@ -58,7 +58,7 @@ impl<'a> Shader<'a> {
         color: LinearRgb,
     ) -> (LinearRgb, f64) {
         let ray = self.plan.rays().at(position);
-        let point: DVec3 = corners.positions.iter().zip(weights).map(|(p, w)| *p * w).sum();
+        let point = corners.point(weights);
         let normal = self.normal(corners, weights);
         let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
         let to_eye = -ray.direction;

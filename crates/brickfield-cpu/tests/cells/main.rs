@@ -5,5 +5,7 @@ mod closed_forms;
 mod grids;
 mod laws;
 mod orders;
+#[path = "../support/slope.rs"]
+mod slope;
 #[path = "../support/mod.rs"]
 mod support;

@@ -96,11 +96,11 @@ impl Cells {
         values: &[f32],
         holes: Option<&[bool]>,
     ) -> Result<Cells, CellsError> {
-        let product = |n: UVec3| n.to_array().iter().map(|n| u64::from(*n)).product::<u64>();
-        if n_cells.min_element() == 0 || n_cells.max_element() as u64 > Cells::MAX || product(n_cells) > Cells::MAX {
+        let n_all_cells = n_cells.to_array().iter().map(|n| u128::from(*n)).product::<u128>();
+        if n_all_cells == 0 || n_all_cells > u128::from(Cells::MAX) {
             return Err(CellsError::Size { n_cells });
         }
-        let n_nodes = product(n_cells + 1) as usize;
+        let n_nodes = n_all(n_cells + 1);
         let counts = [("positions", positions.len()), ("values", values.len())];
         let n_holes = holes.map_or(n_nodes, <[bool]>::len);
         if let Some((what, n)) = counts.into_iter().chain([("marks of holes", n_holes)]).find(|(_, n)| *n != n_nodes) {
@@ -124,13 +124,8 @@ impl Cells {
     pub fn of_grid(grid: &StructuredGrid, field: usize) -> Result<Cells, CellsError> {
         let n_fields = grid.fields().len();
         let values = &grid.fields().get(field).ok_or(CellsError::Field { field, n_fields })?.values;
-        let n = grid.n_nodes();
-        let node = |i: u64| {
-            let (x, y) = (u64::from(n.x), u64::from(n.y));
-            UVec3::new((i % x) as u32, (i / x % y) as u32, (i / x / y) as u32)
-        };
-        let positions: Vec<DVec3> = (0..grid.n()).map(|i| grid.position(node(i))).collect();
-        Cells::new(n.saturating_sub(UVec3::ONE), &positions, values, grid.holes())
+        let positions: Vec<DVec3> = (0..grid.n() as usize).map(|i| grid.position(grid.node(i))).collect();
+        Cells::new(grid.n_nodes().saturating_sub(UVec3::ONE), &positions, values, grid.holes())
     }
 
     fn of_nodes(
@@ -249,8 +244,14 @@ fn is_set(words: &[u32], bit: usize) -> bool {
 /// The numbers of a cell's corners.
 pub(super) fn corners(n_cells: UVec3, cell: usize) -> [usize; 8] {
     let [nx, ny, _] = n_cells.to_array().map(|n| n as usize);
-    let (x, y, z) = (cell % nx, cell / nx % ny, cell / nx / ny);
+    let [x, y, z] = place(n_cells, cell).to_array().map(|i| i as usize);
     std::array::from_fn(|i| x + (i & 1) + (nx + 1) * (y + (i >> 1 & 1) + (ny + 1) * (z + (i >> 2))))
+}
+
+/// Where number `i` is of so many along x, y and z.
+fn place(n: UVec3, i: usize) -> UVec3 {
+    let [nx, ny] = [n.x as usize, n.y as usize];
+    UVec3::new((i % nx) as u32, (i / nx % ny) as u32, (i / nx / ny) as u32)
 }
 
 fn n_all(n_cells: UVec3) -> usize {
@@ -285,17 +286,13 @@ fn extent(
     values: &[f32],
     is_used: &[bool],
 ) -> Result<(Aabb, ValueRange), CellsError> {
-    let named = |i: usize| {
-        let [nx, ny, _] = n_cells.to_array().map(|n| n as usize + 1);
-        UVec3::new((i % nx) as u32, (i / nx % ny) as u32, (i / nx / ny) as u32)
-    };
     let all = || (0..positions.len()).filter(|i| is_used[*i]);
     if let Some(i) = all().find(|i| !positions[*i].is_finite()) {
-        return Err(CellsError::Position { node: named(i), position: positions[i] });
+        return Err(CellsError::Position { node: place(n_cells + 1, i), position: positions[i] });
     }
     let is_good = |value: f32| value.abs() <= Cells::MAX_VALUE;
     if let Some(i) = all().find(|i| !is_good(values[*i])) {
-        return Err(CellsError::Value { node: named(i), value: values[i] });
+        return Err(CellsError::Value { node: place(n_cells + 1, i), value: values[i] });
     }
     let around = Aabb::of_points(all().map(|i| positions[i]));
     if around.min.x > around.max.x {
@@ -306,9 +303,8 @@ fn extent(
     if !(radius <= Cells::MAX_RADIUS && (radius == 0.0 || radius >= Cells::MIN_RADIUS)) {
         return Err(CellsError::Radius { radius });
     }
-    let used = || all().map(|i| f64::from(values[i]));
-    let (min, max) = (used().fold(f64::INFINITY, f64::min), used().fold(f64::NEG_INFINITY, f64::max));
-    Ok((around, ValueRange { min, max }))
+    let range = ValueRange::of(all().map(|i| f64::from(values[i])));
+    Ok((around, range.expect("nodes that a box is around")))
 }
 
 #[cfg(test)]
@@ -358,6 +354,9 @@ mod tests {
     fn faults_are_named() {
         let error = |grid: &StructuredGrid, field| Cells::of_grid(grid, field).unwrap_err().to_string();
         assert_eq!(error(&grid(UVec3::splat(2)), 1), "field 1 of a grid with 1");
+        assert!(
+            Cells::new(UVec3::splat(1 << 28), &[], &[], None).is_err_and(|e| e.to_string().starts_with("268435456 x"))
+        );
         assert!(error(&grid(UVec3::new(2, 2, 1)), 0).starts_with("1 x 1 x 0 cells"));
         let flat = [DVec3::ZERO; 8];
         let error = |positions: &[DVec3], values: &[f32]| {

@@ -84,12 +84,10 @@ impl Mesh {
         triangles: Vec<MeshTriangle>,
     ) -> Result<Mesh, MeshError> {
         check(positions, values, normals, &triangles)?;
-        let mut extent = Aabb { min: DVec3::ZERO, max: DVec3::ZERO };
-        if let Some(first) = positions.first() {
-            extent = positions
-                .iter()
-                .fold(Aabb { min: *first, max: *first }, |b, p| Aabb { min: b.min.min(*p), max: b.max.max(*p) });
-        }
+        let extent = match positions {
+            [] => Aabb { min: DVec3::ZERO, max: DVec3::ZERO },
+            some => Aabb::of_points(some.iter().copied()),
+        };
         let (center, radius) = (extent.center(), 0.5 * extent.diagonal());
         if radius.is_nan() || radius > Mesh::MAX_RADIUS {
             return Err(MeshError::Far { radius });

@@ -113,7 +113,7 @@ impl MeshPlan {
             return Err(MeshPlanError::LineColor { color });
         }
         let rays = ViewRays::new(&camera, size, mesh.center(), mesh.radius());
-        let (reach, most) = (rays.eye().length() + mesh.radius(), MOST_REACH * mesh.unit().min(1.0));
+        let (reach, most) = (reach(&rays, &mesh), MOST_REACH * mesh.unit().min(1.0));
         if reach.is_nan() || reach > most {
             return Err(MeshPlanError::Far { reach, most });
         }
@@ -160,7 +160,7 @@ impl MeshPlan {
 
     /// No vertex is farther from the eye.
     pub fn reach(&self) -> f64 {
-        self.rays.eye().length() + self.mesh.radius()
+        reach(&self.rays, &self.mesh)
     }
 
     /// The same plan with other rays (a mutant in conformance runs has some).
@@ -197,6 +197,11 @@ impl MeshPlan {
             LightSource::Place(place) => (place - self.mesh.center() - point).normalize_or_zero(),
         }
     }
+}
+
+/// No vertex is farther from the eye.
+fn reach(rays: &ViewRays, mesh: &Mesh) -> f64 {
+    rays.eye().length() + mesh.radius()
 }
 
 /// What a mesh's shader has to do; the rest is left out.

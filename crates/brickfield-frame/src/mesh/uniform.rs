@@ -1,6 +1,7 @@
 //! The numbers of a mesh's picture as shaders read them.
 
 use brickfield_core::glam::DVec3;
+use brickfield_core::rounded_up;
 use brickfield_optics::LightSource;
 use bytemuck::{Pod, Zeroable};
 
@@ -118,10 +119,6 @@ const FAR_LIGHT: f64 = 1e12;
 /// A knot of the colour map as shaders read it: red, green, blue, and its value. That is rounded up, so that the same values of f32 are
 /// at or above it.
 pub(crate) fn color_knots(plan: &MeshPlan) -> Vec<[f32; 4]> {
-    let rounded_up = |value: f64| match value as f32 {
-        nearest if f64::from(nearest) < value => nearest.next_up(),
-        nearest => nearest,
-    };
     let knot =
         |k: &brickfield_core::Knot| [k.color[0] as f32, k.color[1] as f32, k.color[2] as f32, rounded_up(k.value)];
     plan.colors.knots().iter().map(knot).collect()

@@ -45,10 +45,7 @@ fn read_from(source: &mut dyn ByteSource, options: &GridOptions) -> Result<Opene
         holes[start..].iter_mut().zip(row).for_each(|(hole, is_missing)| *hole |= is_missing);
     }
     let elevation = NodeField { name: "elevation".to_owned(), unit: keys.vertical_unit, values };
-    let mut grid = StructuredGrid::new(n_nodes.extend(1), points)?.with_field(elevation)?;
-    if holes.contains(&true) {
-        grid = grid.with_holes(&holes)?;
-    }
+    let grid = StructuredGrid::new(n_nodes.extend(1), points)?.with_field(elevation)?.with_holes(&holes)?;
     let unit = keys.unit;
     Ok(OpenedGrids { unit, notes, ..OpenedGrids::new(vec![grid], GridFormat::GeoTiff) })
 }

@@ -80,10 +80,7 @@ fn read_from(source: &mut dyn ByteSource, corner: TileCorner, options: &GridOpti
     let points = placement.points(Horizontal::Degrees, &mut notes)?;
     let (values, holes) = read_values(source, n as usize)?;
     let elevation = NodeField { name: "elevation".to_owned(), unit: Some("m".to_owned()), values };
-    let mut grid = StructuredGrid::new(n_nodes.extend(1), points)?.with_field(elevation)?;
-    if holes.contains(&true) {
-        grid = grid.with_holes(&holes)?;
-    }
+    let grid = StructuredGrid::new(n_nodes.extend(1), points)?.with_field(elevation)?.with_holes(&holes)?;
     let unit = Some("m".to_owned());
     Ok(OpenedGrids { unit, notes, ..OpenedGrids::new(vec![grid], GridFormat::Hgt) })
 }

@@ -20,7 +20,7 @@ pub(crate) fn add_array(
     if about.name == GHOSTS && n_components == 1 {
         let mut holes = with_room(numbers.len())?;
         with_voxels!(numbers, v => holes.extend(v.iter().map(|mark| mark.to_f64() as u64 & HIDDEN_POINT != 0)));
-        return Ok(if holes.contains(&true) { grid.with_holes(&holes)? } else { grid });
+        return Ok(grid.with_holes(&holes)?);
     }
     for (component, name) in component_names(about).into_iter().enumerate() {
         let mut values = with_room(numbers.len() / n_components)?;

@@ -35,7 +35,7 @@ pub(crate) fn read_grid(
     if let Some(blanking) = &sections.blanking {
         let marks = reader.read(source, blanking, n_nodes)?;
         let holes: Vec<bool> = (0..marks.len()).map(|i| marks.at(i) == 0.0).collect();
-        grid = if holes.contains(&true) { grid.with_holes(&holes)? } else { grid };
+        grid = grid.with_holes(&holes)?;
     }
     Ok((grid, notes))
 }

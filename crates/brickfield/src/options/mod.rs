@@ -5,7 +5,7 @@ mod light;
 mod sampling;
 pub mod values;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 #[cfg(feature = "formats")]
 use brickfield_bricks::BlockSource;
@@ -118,7 +118,8 @@ fn transfer_help() -> String {
     )
 }
 
-fn presets() -> String {
+/// The names of all presets, as messages list them.
+pub fn presets() -> String {
     Preset::ALL.map(|p| p.name()).join(", ")
 }
 
@@ -126,11 +127,33 @@ fn presets() -> String {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Background(pub LinearRgb);
 
-/// A transfer function as far as it is known before the volume is.
-enum NamedTransfer {
+/// A transfer function as far as it is known before the values are.
+#[derive(Clone, Debug)]
+pub enum NamedTransfer {
+    /// `auto`: from a volume's histogram.
     Automatic,
+    /// A preset, by its name.
     Preset(Preset),
+    /// That of a file.
     OfFile(TransferFunction),
+}
+
+impl NamedTransfer {
+    /// What an option names; `None` if it is neither `auto`, nor a preset, nor a file.
+    ///
+    /// # Errors
+    /// What is wrong in the file.
+    pub fn of(name: &str) -> Result<Option<NamedTransfer>, OptionError> {
+        if name == "auto" {
+            return Ok(Some(NamedTransfer::Automatic));
+        }
+        if let Some(preset) = Preset::from_name(name) {
+            return Ok(Some(NamedTransfer::Preset(preset)));
+        }
+        let path = Path::new(name);
+        let of_file = || Ok(NamedTransfer::OfFile(brickfield_optics::read_transfer(path)?));
+        path.exists().then(of_file).transpose()
+    }
 }
 
 /// Which bricks are shown as boxes over a picture.
@@ -356,17 +379,8 @@ impl ViewOptions {
     }
 
     fn named_transfer(&self) -> Result<NamedTransfer, OptionError> {
-        if self.transfer == "auto" {
-            return Ok(NamedTransfer::Automatic);
-        }
-        if let Some(preset) = Preset::from_name(&self.transfer) {
-            return Ok(NamedTransfer::Preset(preset));
-        }
-        let path = PathBuf::from(&self.transfer);
-        if path.exists() {
-            return Ok(NamedTransfer::OfFile(brickfield_optics::read_transfer(&path)?));
-        }
-        Err(OptionError::NoSuchTransfer { name: self.transfer.clone(), presets: presets() })
+        let no_such = || OptionError::NoSuchTransfer { name: self.transfer.clone(), presets: presets() };
+        NamedTransfer::of(&self.transfer)?.ok_or_else(no_such)
     }
 
     /// The scene of a volume, sampled as by default; what of the options the volume does not have is printed.

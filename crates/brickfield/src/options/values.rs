@@ -4,7 +4,7 @@
 use brickfield_bricks::Downsampling;
 use brickfield_core::glam::{DVec3, UVec2};
 use brickfield_core::{Aabb, BlockSide, BrickSide, Interblock, Level, ScalarType, WorldPos};
-use brickfield_curvilinear::GridPlane;
+use brickfield_curvilinear::IndexPlane;
 use brickfield_frame::{Division, Join, Lengths, Mode, Placement, Slices, Target, Upload};
 use brickfield_io::{ByteOrder, RawSpec};
 use brickfield_lod::Criterion;
@@ -44,12 +44,12 @@ pub fn line_width(text: &str) -> Result<f64, String> {
 }
 
 /// A plane of a structured grid.
-pub fn plane(text: &str) -> Result<GridPlane, String> {
+pub fn plane(text: &str) -> Result<IndexPlane, String> {
     let parsed = text.split_once('=').and_then(|(axis, index)| Some((axis.trim(), index.trim().parse::<u32>().ok()?)));
     match parsed {
-        Some(("i", index)) => Ok(GridPlane::I(index)),
-        Some(("j", index)) => Ok(GridPlane::J(index)),
-        Some(("k", index)) => Ok(GridPlane::K(index)),
+        Some(("i", index)) => Ok(IndexPlane::X(index)),
+        Some(("j", index)) => Ok(IndexPlane::Y(index)),
+        Some(("k", index)) => Ok(IndexPlane::Z(index)),
         _ => Err("a plane is i=N, j=N or k=N, N from 0, for example k=12".to_owned()),
     }
 }

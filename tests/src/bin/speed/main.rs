@@ -173,7 +173,8 @@ fn serve_frames(options: &Arguments) -> anyhow::Result<()> {
     let mut latest = vec![None; backends.len()];
     serve(&offers, io::stdin().lock(), io::stdout().lock(), |i| -> anyhow::Result<f64> {
         let Entrant { contestant, backend, .. } = &mut entrants[i];
-        let turn = Turn { contestant: i, warm_up: false, again: latest[*backend].replace(i) == Some(i) };
+        // Who asks counts the rounds: here every turn is timed.
+        let turn = Turn { contestant: i, round: 1, again: latest[*backend].replace(i) == Some(i) };
         Ok(contestant.take(turn, backends[*backend].1.as_mut())?.ms)
     })
 }

@@ -148,10 +148,7 @@ fn read_grid(
     }
     numbers.mark(n_record_bytes, &what)?;
     let grid = StructuredGrid::new(n_nodes, GridPoints::Curvilinear(positions))?;
-    match holes.contains(&true) {
-        true => Ok(grid.with_holes(&holes)?),
-        false => Ok(grid),
-    }
+    Ok(if has_iblank { grid.with_holes(&holes)? } else { grid })
 }
 
 fn n_in(n_nodes: UVec3) -> usize {

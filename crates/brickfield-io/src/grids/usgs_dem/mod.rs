@@ -139,10 +139,7 @@ fn finish(about: &RecordA, rows: &Rows, values: Vec<f32>, holes: &[bool]) -> Res
     let mut notes = Vec::new();
     let points = placement.points(about.horizontal, &mut notes)?;
     let elevation = NodeField { name: "elevation".to_owned(), unit: Some(about.elevation_unit.to_owned()), values };
-    let mut grid = StructuredGrid::new(rows.n_nodes.extend(1), points)?.with_field(elevation)?;
-    if holes.contains(&true) {
-        grid = grid.with_holes(holes)?;
-    }
+    let grid = StructuredGrid::new(rows.n_nodes.extend(1), points)?.with_field(elevation)?.with_holes(holes)?;
     let unit = Some(unit.to_owned());
     Ok(OpenedGrids { unit, notes, ..OpenedGrids::new(vec![grid], GridFormat::UsgsDem) })
 }

@@ -28,7 +28,7 @@ struct ValidationNeedsAsh {
 }
 
 impl BackendOptions {
-    /// Opens the first backend that is there, of those that may be meant.
+    /// Opens the first candidate that opens; the last one's error if none does.
     pub(crate) fn open(&self) -> Result<Box<dyn Backend>, Failure> {
         let validation = if self.validation { Validation::On } else { Validation::Off };
         let mut last: Option<BackendError> = None;

@@ -7,8 +7,7 @@ use brickfield::core::{Camera, Image, StructuredGrid, TransferFunction, ValueRan
 use brickfield::curvilinear::CurvilinearGrid;
 use brickfield::frame::{Backend, Cells, CellsPlan, CellsView, Frame, MeshLines, MeshPlan, MeshView, Sampling};
 use brickfield::io::WorldFrame;
-use brickfield::optics::{Preset, read_transfer};
-use brickfield::options::OptionError;
+use brickfield::options::{NamedTransfer, OptionError, presets};
 use brickfield::{SurfaceNormals, check_picture_path, joined_mesh, spectrum, write_picture};
 
 use crate::backend::check_validation;
@@ -68,15 +67,13 @@ struct NoSuchTransfer {
 }
 
 fn transfer(args: &CellsArgs, range: ValueRange, length: f64) -> Result<TransferFunction, Failure> {
-    if let Some(preset) = Preset::from_name(&args.transfer) {
-        return Ok(preset.transfer(range, length)?);
+    match NamedTransfer::of(&args.transfer)? {
+        Some(NamedTransfer::Preset(preset)) => Ok(preset.transfer(range, length)?),
+        Some(NamedTransfer::OfFile(transfer)) => Ok(transfer),
+        Some(NamedTransfer::Automatic) | None => {
+            Err(Failure::usage(NoSuchTransfer { name: args.transfer.clone(), presets: presets() }))
+        }
     }
-    let path = std::path::Path::new(&args.transfer);
-    if path.exists() {
-        return Ok(read_transfer(path).map_err(OptionError::from)?);
-    }
-    let presets = Preset::ALL.map(|preset| preset.name()).join(", ");
-    Err(Failure::usage(NoSuchTransfer { name: args.transfer.clone(), presets }))
 }
 
 /// The planes of the grid that are asked for, as an opaque surface amid the cells.
@@ -93,7 +90,7 @@ fn surfaces(
     }
     let planes = args.plane.iter().map(|plane| CurvilinearGrid::of_plane(grid, *plane, field));
     let planes: Vec<CurvilinearGrid> = planes.collect::<Result<_, _>>()?;
-    let mesh = Arc::new(joined_mesh(&planes, SurfaceNormals::Triangles)?);
+    let mesh = Arc::new(joined_mesh(planes, SurfaceNormals::Triangles)?);
     let view = MeshView {
         camera: *camera,
         size: args.size,

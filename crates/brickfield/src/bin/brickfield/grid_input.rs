@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use brickfield::core::glam::{DMat3, DVec3, UVec3};
-use brickfield::core::{Aabb, Grid, StructuredGrid, ValueRange};
-use brickfield::curvilinear::GridPlane;
+use brickfield::core::{Aabb, Grid, StructuredGrid};
+use brickfield::curvilinear::IndexPlane;
 use brickfield::io::{GridOptions, Limits, OpenedGrids, open_grid};
 use clap::Args;
 
@@ -80,20 +80,15 @@ impl GridInput {
 }
 
 /// Refuses a plane that the grid does not have.
-pub(crate) fn check_plane(grid: &StructuredGrid, plane: GridPlane) -> Result<(), Failure> {
+pub(crate) fn check_plane(grid: &StructuredGrid, plane: IndexPlane) -> Result<(), Failure> {
     let nodes = grid.n_nodes();
-    let (axis, index, n) = match plane {
-        GridPlane::I(i) => ('i', i, nodes.x),
-        GridPlane::J(j) => ('j', j, nodes.y),
-        GridPlane::K(k) => ('k', k, nodes.z),
-    };
+    let (axis, index, n) = (plane.letter(), plane.index(), nodes[plane.axis()]);
     if index >= n {
         return Err(Failure::usage(GridFault::Plane { axis, index, n }));
     }
-    let n_across = nodes.to_array().into_iter().zip("ijk".chars()).filter(|(_, other)| *other != axis);
-    match n_across.map(|(n, _)| n).min() {
-        Some(0 | 1) => Err(Failure::usage(GridFault::Line { axis, n: nodes })),
-        _ => Ok(()),
+    match plane.across().iter().any(|across| nodes[*across] < 2) {
+        true => Err(Failure::usage(GridFault::Line { axis, n: nodes })),
+        false => Ok(()),
     }
 }
 
@@ -101,15 +96,8 @@ pub(crate) fn check_plane(grid: &StructuredGrid, plane: GridPlane) -> Result<(),
 pub(crate) fn box_grid(around: Option<Aabb>) -> Result<Grid, Failure> {
     let around = around.ok_or(GridFault::Holes)?;
     let (min, max) = (around.min, around.max);
-    let extent = around.max - around.min;
+    let extent = around.extent();
     let size = extent.max(DVec3::splat(extent.max_element() * 1e-6)).max(DVec3::splat(f64::MIN_POSITIVE));
     Grid::from_first_sample(UVec3::ONE, size, around.min + 0.5 * size, DMat3::IDENTITY)
         .map_err(|_| GridFault::Extent { min, max }.into())
-}
-
-/// The range of values that are no holes; 0 to 0 if all are.
-pub(crate) fn range_of(values: &[f32]) -> ValueRange {
-    let values = || values.iter().filter(|v| v.is_finite()).map(|v| f64::from(*v));
-    let (min, max) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-    if min <= max { ValueRange { min, max } } else { ValueRange { min: 0.0, max: 0.0 } }
 }

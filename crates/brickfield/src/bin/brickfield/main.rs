@@ -23,7 +23,7 @@ use brickfield::Codec;
 #[cfg(feature = "fetch")]
 use brickfield::core::Aabb;
 use brickfield::core::glam::UVec2;
-use brickfield::curvilinear::GridPlane;
+use brickfield::curvilinear::IndexPlane;
 use brickfield::frame::{Mode, QuadratureRule};
 use brickfield::io::SAVED_EXTENSIONS;
 use brickfield::options::{
@@ -243,7 +243,7 @@ struct CellsArgs {
     rule: QuadratureRule,
     /// Planes of the grid that are drawn amid the cells, opaque and coloured by their values: i=N, j=N or k=N, from 0; may be repeated
     #[arg(long, value_name = "PLANE", value_delimiter = ',', value_parser = values::plane)]
-    plane: Vec<GridPlane>,
+    plane: Vec<IndexPlane>,
     /// Light on the planes
     #[command(flatten)]
     light: LightSourceOptions,
@@ -263,7 +263,7 @@ struct SurfaceArgs {
     backend: BackendOptions,
     /// Plane of the grid: i=N, j=N or k=N, from 0; k=0 unless stated, which of terrain is a height field
     #[arg(long, value_name = "PLANE", value_parser = values::plane)]
-    plane: Option<GridPlane>,
+    plane: Option<IndexPlane>,
     /// By how much heights of terrain are exaggerated, 1 unless stated; 0: flat
     #[arg(long, value_name = "FACTOR", value_parser = values::exaggeration, allow_hyphen_values = true)]
     exaggeration: Option<f64>,

@@ -260,7 +260,6 @@ fn note_if_nothing_shows(plan: &FramePlan) {
     }
 }
 
-/// The first candidate that opens; the last one's error if none does.
 /// The bricks whose boxes are shown over the picture.
 struct ShownBricks<'a> {
     drawn: &'a [BrickId],

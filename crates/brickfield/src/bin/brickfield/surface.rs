@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use brickfield::core::{Camera, GridPoints, NodeField, StructuredGrid, TransferFunction, ValueRange};
-use brickfield::curvilinear::{BudgetSelector, CurvilinearGrid, GridPlane, QuadTree, Selection, SizeSelector, View};
+use brickfield::curvilinear::{BudgetSelector, CurvilinearGrid, IndexPlane, QuadTree, Selection, SizeSelector, View};
 use brickfield::frame::{Coloring, MeshFrame, MeshLines, MeshPlan, MeshView};
 use brickfield::io::WorldFrame;
 use brickfield::optics::{ReadTransferError, read_transfer};
@@ -12,7 +12,7 @@ use brickfield::overlay::show_color_bar;
 use brickfield::{check_picture_path, spectrum, surface_mesh, write_picture};
 
 use crate::backend::check_validation;
-use crate::grid_input::{box_grid, check_plane, range_of};
+use crate::grid_input::{box_grid, check_plane};
 use crate::{Failure, SurfaceArgs, print};
 
 pub(crate) fn run(args: &SurfaceArgs) -> Result<(), Failure> {
@@ -80,7 +80,7 @@ impl Subject {
         let surface = zones(&grid, field, args)?;
         let NodeField { name, unit, .. } = &grid.fields()[field];
         let tree = Arc::new(QuadTree::build(surface));
-        let range = range_of(tree.grid().values());
+        let range = tree.grid().range().unwrap_or(ValueRange { min: 0.0, max: 0.0 });
         let colors = match &args.colors {
             Some(path) => read_transfer(path).map_err(|source| ColorsFault { source })?,
             None => spectrum(range).map_err(OptionError::from)?,
@@ -116,10 +116,10 @@ impl Subject {
 
 /// The zones of the plane that is asked for; terrain is a height field unless it is to be flat.
 fn zones(grid: &StructuredGrid, field: usize, args: &SurfaceArgs) -> Result<CurvilinearGrid, Failure> {
-    let plane = args.plane.unwrap_or(GridPlane::K(0));
+    let plane = args.plane.unwrap_or(IndexPlane::Z(0));
     check_plane(grid, plane)?;
     let is_terrain =
-        grid.n_nodes().z == 1 && plane == GridPlane::K(0) && matches!(grid.points(), GridPoints::Even { .. });
+        grid.n_nodes().z == 1 && plane == IndexPlane::Z(0) && matches!(grid.points(), GridPoints::Even { .. });
     match (is_terrain, args.exaggeration) {
         (true, exaggeration) => Ok(CurvilinearGrid::of_heights(grid, field, exaggeration.unwrap_or(1.0))?),
         (false, None) => Ok(CurvilinearGrid::of_plane(grid, plane, field)?),
