@@ -70,7 +70,9 @@ impl Resources {
 
     fn entry(&mut self, resource: Resource) -> &mut Reused {
         let usage = match resource {
-            Resource::Frame | Resource::Decoding | Resource::MeshView => vk::BufferUsageFlags::UNIFORM_BUFFER,
+            Resource::Frame | Resource::FewKnots | Resource::Decoding | Resource::MeshView => {
+                vk::BufferUsageFlags::UNIFORM_BUFFER
+            }
             _ => vk::BufferUsageFlags::STORAGE_BUFFER,
         };
         self.buffers.entry(resource).or_insert_with(|| Reused::new(resource.name(), usage))

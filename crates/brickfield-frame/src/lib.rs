@@ -56,6 +56,6 @@ pub use sampling::{Division, Lengths, Mode, Sampling, SamplingError};
 pub use skip::{Beams, DarkError, DarkRegions, KeptBoxes, MACROCELL_SIDE, MacrocellRanges, Occupancy, Overview};
 pub use spoil::SpoiltPlan;
 pub use surfaces::{Placement, PlacementError, PlaneStacks, Steps};
-pub use uniform::{FrameUniforms, KnotUniform, PlaceUniform};
+pub use uniform::{FEW_KNOTS, FrameUniforms, KnotUniform, PlaceUniform};
 pub use value_scale::ValueScale;
 pub use view_rays::{ViewRay, ViewRays};

@@ -36,6 +36,8 @@ pub enum Resource {
     OneGradients,
     /// The transfer function's knots.
     Knots,
+    /// The first [`FEW_KNOTS`](crate::FEW_KNOTS) of them.
+    FewKnots,
     /// The light on surfaces ([`LightUniform`]).
     Light,
     /// The picture that rays are stored to.
@@ -102,7 +104,7 @@ pub enum Content<'a> {
 
 impl Resource {
     /// All resources.
-    pub const ALL: [Resource; 38] = [
+    pub const ALL: [Resource; 39] = [
         Resource::Frame,
         Resource::Atlas,
         Resource::AtlasSampler,
@@ -115,6 +117,7 @@ impl Resource {
         Resource::Gradients,
         Resource::OneGradients,
         Resource::Knots,
+        Resource::FewKnots,
         Resource::Light,
         Resource::Picture,
         Resource::Inputs,
@@ -146,7 +149,7 @@ impl Resource {
     /// The name in shaders and messages.
     pub const fn name(self) -> &'static str {
         match self {
-            Resource::Frame => "frame",
+            Resource::Frame => "frame_block",
             Resource::Atlas => "atlas",
             Resource::AtlasSampler => "atlas_sampler",
             Resource::Index => "index",
@@ -158,6 +161,7 @@ impl Resource {
             Resource::Gradients => "gradients",
             Resource::OneGradients => "one_gradients",
             Resource::Knots => "knots",
+            Resource::FewKnots => "knots_block",
             Resource::Light => "light",
             Resource::Picture => "picture",
             Resource::Inputs => "inputs",
@@ -209,6 +213,7 @@ impl FramePlan {
             Resource::Gradients => self.gradients().map(|slots| Content::Texture(slots)),
             Resource::OneGradients => self.gradients().and_then(|slots| slots.one_table()).map(Content::Chunks),
             Resource::Knots => bytes(bytemuck::cast_slice(&KnotUniform::of(self))),
+            Resource::FewKnots => bytes(bytemuck::cast_slice(&KnotUniform::few(&KnotUniform::of(self)))),
             Resource::Light => LightUniform::of(self).and_then(|light| bytes(bytemuck::bytes_of(&light))),
             Resource::Occupancy => self.occupancy.as_ref().map(|occupancy| Content::Chunks(&**occupancy)),
             Resource::Kept => self.kept.as_ref().map(|kept| Content::Chunks(kept.table())),
@@ -265,9 +270,8 @@ impl CellsPlan {
         let cells = self.cells();
         match resource {
             Resource::Frame => bytes(bytemuck::bytes_of(&FrameUniforms::of_cells(self))),
-            Resource::Knots => {
-                bytes(bytemuck::cast_slice(&KnotUniform::of_transfer(self.transfer(), self.value_scale())))
-            }
+            Resource::Knots => bytes(bytemuck::cast_slice(&KnotUniform::of_cells(self))),
+            Resource::FewKnots => bytes(bytemuck::cast_slice(&KnotUniform::few(&KnotUniform::of_cells(self)))),
             Resource::Nodes => Some(Content::Chunks(cells.node_table())),
             Resource::Faces => Some(Content::Chunks(cells.face_table())),
             Resource::Boxes => Some(Content::Chunks(cells.box_table())),

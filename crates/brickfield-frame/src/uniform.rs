@@ -6,7 +6,7 @@ use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Knot, Place, TransferFunction};
 use bytemuck::{Pod, Zeroable};
 
-use crate::{AtlasShape, CellsPlan, FramePlan, Handedness, Pass, ValueScale};
+use crate::{AtlasShape, CellsPlan, FramePlan, Handedness, Pass, Sampling, ValueScale};
 
 /// The frame's uniform block: vectors of three, each followed by an unrelated number. Positions are in
 /// sample space relative to `RayFrame::center`.
@@ -35,8 +35,8 @@ pub struct FrameUniforms {
     pub step_world: f32,
     /// Change of the direction a pixel down.
     pub direction_down: [f32; 3],
-    /// The transmittance at which rays end.
-    pub transmittance_floor: f32,
+    /// The optical depth beyond which rays end.
+    pub end_depth: f32,
     /// Lower corner of the domain.
     pub domain_min: [f32; 3],
     /// Scale from a sample as it is read to a number of [`ValueScale`](crate::ValueScale).
@@ -101,6 +101,9 @@ pub struct FrameUniforms {
     pub seen_row: u32,
 }
 
+/// A transfer function of so many knots is few numbers: shaders compare with each of them, and look nothing up.
+pub const FEW_KNOTS: usize = 8;
+
 /// A transfer function's knot.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -153,7 +156,7 @@ impl FrameUniforms {
             direction_right: float3(rays.direction[1]),
             step_world: plan.sampling.step_world() as f32,
             direction_down: float3(rays.direction[2]),
-            transmittance_floor: plan.sampling.transmittance_floor() as f32,
+            end_depth: end_depth(&plan.sampling),
             domain_min: relative(plan.domain.min),
             sample_scale: samples.scale as f32,
             domain_max: relative(plan.domain.max),
@@ -215,7 +218,7 @@ impl FrameUniforms {
             direction_right: float3(rays.direction[1]),
             step_world: (step / unit) as f32,
             direction_down: float3(rays.direction[2]),
-            transmittance_floor: plan.sampling().transmittance_floor() as f32,
+            end_depth: end_depth(plan.sampling()),
             sample_scale: values.unit().recip() as f32,
             sample_offset: ((f64::from(counted_from) - values.origin()) / values.unit()) as f32,
             counted_from,
@@ -246,8 +249,18 @@ impl KnotUniform {
         KnotUniform::of_transfer(&plan.transfer, plan.value_scale())
     }
 
-    /// The knots of a transfer function, their values in a scale.
-    pub fn of_transfer(transfer: &TransferFunction, values: ValueScale) -> Vec<KnotUniform> {
+    /// The knots of the transfer function of a plan of cells.
+    pub fn of_cells(plan: &CellsPlan) -> Vec<KnotUniform> {
+        KnotUniform::of_transfer(plan.transfer(), plan.value_scale())
+    }
+
+    /// The first of some knots; behind the last, knots that no value reaches.
+    pub fn few(knots: &[KnotUniform]) -> [KnotUniform; FEW_KNOTS] {
+        let beyond = KnotUniform { value: f32::MAX, ..KnotUniform::zeroed() };
+        std::array::from_fn(|i| knots.get(i).copied().unwrap_or(beyond))
+    }
+
+    fn of_transfer(transfer: &TransferFunction, values: ValueScale) -> Vec<KnotUniform> {
         let knots = transfer.knots();
         let reciprocal = |i: usize| match knots.get(i + 1) {
             Some(next) if next.value > knots[i].value => values.unit() / (next.value - knots[i].value),
@@ -270,6 +283,11 @@ impl PlaceUniform {
             axes: x | y << 2 | z << 4,
         }
     }
+}
+
+/// The optical depth beyond which less than the transmittance floor shines through.
+fn end_depth(sampling: &Sampling) -> f32 {
+    (-sampling.transmittance_floor().ln()).min(f64::from(f32::MAX)) as f32
 }
 
 /// From samples as shaders read them to numbers of the value scale: (read - counted_from) * scale + offset.

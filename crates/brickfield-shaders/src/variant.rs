@@ -2,8 +2,8 @@
 
 use brickfield_core::Interblock;
 use brickfield_frame::{
-    CellsPlan, CellsShading, Coloring, Division, Feature, FeatureSet, Fetch, FramePlan, Join, Lengths, MeshShading,
-    Placement, Places, QuadratureRule, ShaderFunction, Slices,
+    CellsPlan, CellsShading, Coloring, Division, FEW_KNOTS, Feature, FeatureSet, Fetch, FramePlan, Join, Lengths,
+    MeshShading, Placement, Places, QuadratureRule, ShaderFunction, Slices,
 };
 
 use crate::passes::has_long_rays;
@@ -189,6 +189,11 @@ impl KnotSearch {
     /// All searches.
     pub fn all() -> impl Iterator<Item = KnotSearch> {
         (0..=KnotSearch::MOST_HALVINGS).map(KnotSearch::Unrolled).chain([KnotSearch::Loop])
+    }
+
+    /// Whether shaders compare with every knot.
+    fn is_of_few(self) -> bool {
+        matches!(self, KnotSearch::Unrolled(halvings) if 1 << halvings <= FEW_KNOTS)
     }
 
     fn conditions(self) -> impl Iterator<Item = (String, bool)> {
@@ -394,6 +399,7 @@ impl Variant {
             ("interiors_first", self.entry == Entry::Proxy(Slices::InteriorsFirst)),
             ("dense", self.field == FieldKind::Dense),
             ("flat_blocks", matches!(self.field, FieldKind::Blocks(_) | FieldKind::Dense)),
+            ("few_knots", has(Feature::TransferLookup) && self.search.is_of_few()),
             ("long_rays", self.long_rays),
             ("rays_go_on", self.long_rays || self.batch),
             ("integer_samples", self.integer_samples),

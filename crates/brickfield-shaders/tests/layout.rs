@@ -84,7 +84,7 @@ fn assert_rows() {
         direction_right,
         step_world,
         direction_down,
-        transmittance_floor,
+        end_depth,
         domain_min,
         sample_scale,
         domain_max,

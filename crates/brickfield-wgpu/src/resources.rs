@@ -49,7 +49,7 @@ impl Resources {
     /// The buffer of a resource.
     pub(crate) fn buffer(&mut self, resource: Resource) -> &mut Reused {
         let usage = match resource {
-            Resource::Frame | Resource::Decoding | Resource::MeshView => BufferUsages::UNIFORM,
+            Resource::Frame | Resource::FewKnots | Resource::Decoding | Resource::MeshView => BufferUsages::UNIFORM,
             _ => BufferUsages::STORAGE,
         };
         let usage = usage | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;

@@ -193,7 +193,7 @@ mutants! {
     SPLIT_SWAPPED: "split-swapped", "interblock", "edge_weights", "select(upper, lower, rho < 0.0)"
         => "select(lower, upper, rho < 0.0)";
     /// Rays end at a transmittance of 1/5.
-    ENDS_EARLY: "ends-early", "ending", "ended", "exp(-seen.w) < transmittance_floor()" => "exp(-seen.w) < 0.2";
+    ENDS_EARLY: "ends-early", "ending", "ended", "seen.w > end_depth()" => "seen.w > 1.6";
     /// Bricks have the steps of level 0, whatever their level.
     STEPS_OF_LEVEL_0: "steps-of-level-0", "segments", "in_steps_of", "own.apart *= steps_in(area);" => "";
     /// A brick's segments go on to the end of the ray.

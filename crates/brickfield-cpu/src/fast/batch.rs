@@ -1,6 +1,9 @@
 //! Batches of segments: classified and composited front to back.
 //!
-//! Most batches see one stretch of the transfer function: then there is nothing to look up, and a dark one is passed over.
+//! Most batches see one stretch of the transfer function, or a few neighbouring ones: then nothing is looked up segment by segment, and a dark
+//! stretch is passed over.
+
+use std::ops::RangeInclusive;
 
 use brickfield_optics::QuadratureRule;
 
@@ -8,6 +11,9 @@ use super::brick::{LANES, Lanes};
 use super::classify::{Classifier, Stretch};
 use super::scalar::{THIN, alpha, alpha_thin};
 use super::segment::{Ray32, segment};
+
+/// Most further stretches, beside that of the least value, that a batch is looked at in as a whole.
+const FEW_STRETCHES: usize = 6;
 
 /// The first `n` segments of a rule with one node, from the values there (the last of them in the lanes behind).
 #[inline(always)]
@@ -20,14 +26,19 @@ pub(super) fn one_node(
     state: &mut Ray32,
 ) {
     let (low, high) = extent(values);
-    let stretch = transfer.stretch(low);
-    if high < transfer.end(stretch) {
-        if !transfer.is_dark(stretch) {
-            linear(rule, transfer.linear(stretch), values, n, length, state);
-        }
-        return;
+    let first = transfer.stretch(low);
+    let mut last = first;
+    while last < first + FEW_STRETCHES && high >= transfer.end(last) && transfer.end(last) < f32::INFINITY {
+        last += 1;
     }
-    mixed(rule, transfer, values, n, length, state);
+    if high >= transfer.end(last) {
+        return mixed(rule, transfer, values, n, length, state);
+    }
+    match (last - first, transfer.is_dark(first)) {
+        (0, true) => {}
+        (0, false) => linear(rule, transfer.linear(first), values, n, length, state),
+        _ => neighbours(rule, transfer, first..=last, values, n, length, state),
+    }
 }
 
 /// The first `n` segments of a rule with two nodes, from the values there (the last of them in the lanes behind).
@@ -65,6 +76,49 @@ fn linear(rule: QuadratureRule, stretch: &Stretch, values: &Lanes, n: usize, len
     let weight = weights(&opacity[..n], state);
     let (low, high) = sums(&weight, &place);
     add(state, stretch.rgba(low, high));
+}
+
+/// Segments whose values lie in some neighbouring stretches: all of them are looked at in each.
+#[inline(always)]
+fn neighbours(
+    rule: QuadratureRule,
+    transfer: &Classifier,
+    stretches: RangeInclusive<usize>,
+    values: &Lanes,
+    n: usize,
+    length: f32,
+    state: &mut Ray32,
+) {
+    let (mut place, mut opacity) = ([0f32; LANES], [0f32; LANES]);
+    for i in stretches.clone() {
+        let stretch = transfer.linear(i);
+        // Those beyond it are overwritten by its successor.
+        let begin = if i == *stretches.start() { f32::NEG_INFINITY } else { transfer.end(i - 1) };
+        for l in 0..LANES {
+            let there = stretch.place(values[l]);
+            let thick = stretch.extinction(there) * length;
+            let is_there = values[l] >= begin;
+            place[l] = if is_there { there } else { place[l] };
+            opacity[l] = if is_there { thick } else { opacity[l] };
+        }
+    }
+    let thickest = extent(&opacity).1;
+    opacities(rule, &mut opacity, thickest);
+    let weight = weights(&opacity[..n], state);
+    let mut sum = [0f32; 4];
+    for i in stretches.clone() {
+        let end = transfer.end(i);
+        let begin = if i == *stretches.start() { f32::NEG_INFINITY } else { transfer.end(i - 1) };
+        let mut own = [0f32; LANES];
+        for l in 0..LANES {
+            own[l] = if values[l] >= begin && values[l] < end { weight[l] } else { 0.0 };
+        }
+        let (low, high) = sums(&own, &place);
+        for (sum, x) in sum.iter_mut().zip(transfer.linear(i).rgba(low, high)) {
+            *sum += x;
+        }
+    }
+    add(state, sum);
 }
 
 /// Segments whose values lie anywhere.
