@@ -1,5 +1,6 @@
 //! Building the octree: finest level first, each level from the one below, bricks in parallel.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use brickfield_core::{BrickId, BrickLayout, BrickSide, Level, Rescale, Volume, with_voxels};
@@ -164,7 +165,7 @@ fn fill_level<T: BrickScalar>(
         summary
     });
     let summaries = summaries.collect();
-    Ok(TreeLevel { samples: T::wrap(samples), summaries })
+    Ok(TreeLevel { samples: Arc::new(T::wrap(samples)), summaries })
 }
 
 fn zeroed<T: BrickScalar>(n: usize, level: Level) -> Result<Vec<T>, BuildError> {
