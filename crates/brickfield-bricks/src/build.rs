@@ -125,9 +125,10 @@ fn build_levels<T: BrickScalar>(voxels: &[T], job: &Job<'_>) -> Result<Vec<TreeL
 
 fn finest_level<T: BrickScalar>(source: Dense<'_, T>, job: &Job<'_>) -> Result<TreeLevel, BuildError> {
     let table = BinTable::new(job.bins, T::TYPE, job.rescale);
-    fill_level(source, Level(0), job, |id, samples| BrickSummary {
-        range: job.rescale.values(range_of(samples)),
-        histogram: owned_histogram(samples, &job.layout, id, &table),
+    fill_level(source, Level(0), job, |id, samples| {
+        let stored = range_of(samples);
+        let histogram = owned_histogram(samples, &job.layout, id, stored, &table);
+        BrickSummary { range: job.rescale.values(stored), histogram }
     })
 }
 
