@@ -49,11 +49,8 @@ impl Coding {
 
     /// The bytes of samples whose form is that of a backend: nothing is copied. `None` of all others.
     pub(crate) fn as_stored(&self, samples: &Arc<Voxels>) -> Option<Bytes> {
-        let is_stored = match self.scalar {
-            ScalarType::U8 => true,
-            ScalarType::U16 => cfg!(target_endian = "little"),
-            _ => false,
-        };
+        let is_stored =
+            self.scalar == ScalarType::U8 || self.scalar == ScalarType::U16 && cfg!(target_endian = "little");
         is_stored.then(|| Bytes::from_owner(Stored(samples.clone())))
     }
 }

@@ -14,7 +14,7 @@ pub(crate) fn spread(cells: &mut [u8], [nx, ny, nz]: [usize; 3], farthest: u8) {
     let few_layers = FEW_CELLS.div_ceil(nx * ny);
     cells.par_chunks_mut(nx * ny).with_min_len(few_layers).for_each(|layer| {
         layer.chunks_exact_mut(nx).for_each(along_row);
-        up_and_down(layer, nx, ny, |row, before| near(row, before));
+        up_and_down(layer, nx, ny, near);
     });
     let mut widened = vec![0; nx * ny];
     up_and_down(cells, nx * ny, nz, |layer, before| {
@@ -75,7 +75,7 @@ mod tests {
         for [nx, ny, nz] in [[1, 1, 1], [9, 1, 1], [1, 7, 1], [1, 1, 8], [7, 5, 6], [2, 12, 3], [30, 3, 4]] {
             let at = |i: usize| [i % nx, i / nx % ny, i / nx / ny];
             for rare in [2, 11, 61, 997] {
-                let is_near = |i: &usize| (i * 31 + 5) % rare == 0;
+                let is_near = |i: &usize| (i * 31 + 5).is_multiple_of(rare);
                 let n = nx * ny * nz;
                 let mut cells: Vec<u8> = (0..n).map(|i| if is_near(&i) { 0 } else { 6 }).collect();
                 spread(&mut cells, [nx, ny, nz], 6);

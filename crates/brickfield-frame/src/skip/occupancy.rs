@@ -162,7 +162,7 @@ const BITS: [[i8; 8]; 256] = {
     let mut bits = [[0; 8]; 256];
     let mut i = 0;
     while i < 256 * 8 {
-        bits[i / 8][i % 8] = (i / 8 >> (i % 8) & 1) as i8;
+        bits[i / 8][i % 8] = ((i / 8) >> (i % 8) & 1) as i8;
         i += 1;
     }
     bits
