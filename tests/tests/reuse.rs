@@ -10,9 +10,9 @@ use brickfield::core::{
     BlockSide, BrickSide, Camera, Grid, Interblock, Knot, Level, Projection, TransferFunction, Volume,
 };
 use brickfield::frame::{
-    Backend, Chunk, DarkRegions, Decode, Drawing, Evaluate, Feature, Field, Frame, FramePlan, IndexEntry, IndexGrid,
-    IndexLattice, Join, MacrocellRanges, Mode, Occupancy, Places, PlanParts, QuadratureRule, RayFrame, Reach,
-    SampleFormat, Sampling, Sequence, ShaderFunction, Slots, Steps,
+    Backend, Chunk, DarkRegions, DarkRuns, Decode, Drawing, Evaluate, Feature, Field, Frame, FramePlan, IndexEntry,
+    IndexGrid, IndexLattice, Join, MacrocellRanges, Mode, Occupancy, Places, PlanParts, QuadratureRule, RayFrame,
+    Reach, SampleFormat, Sampling, Sequence, ShaderFunction, Slots, Steps,
 };
 use brickfield::optics::{Light, LightSource, LightTerms, Normals};
 use brickfield::{BlockResidency, BlockStyle, Classification, Scene, prepare_blocks};
@@ -71,7 +71,7 @@ fn brick(tone: u32) -> Brick {
         _ => tone as f32 + (x + 2 * y + 3 * z) as f32 / 128.0,
     };
     let bytes: Vec<u8> = (0..4096).flat_map(|i| value(i % 16, i / 16 % 16, i / 256).to_le_bytes()).collect();
-    let distances = MacrocellRanges::of(SIDE, FORMAT, &bytes).distances(DECODE, &fog());
+    let distances = MacrocellRanges::of(SIDE, FORMAT, &bytes).distances(&DarkRuns::of_transfer(&fog(), FORMAT, DECODE));
     Brick { samples: Arc::new(Chunk::new(bytes)), distances: Arc::new(distances) }
 }
 

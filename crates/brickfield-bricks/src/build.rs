@@ -1,5 +1,6 @@
 //! Building the octree: finest level first, each level from the one below, bricks in parallel.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use brickfield_core::{BrickId, BrickLayout, BrickSide, Level, Rescale, Volume, with_voxels};
@@ -124,9 +125,10 @@ fn build_levels<T: BrickScalar>(voxels: &[T], job: &Job<'_>) -> Result<Vec<TreeL
 
 fn finest_level<T: BrickScalar>(source: Dense<'_, T>, job: &Job<'_>) -> Result<TreeLevel, BuildError> {
     let table = BinTable::new(job.bins, T::TYPE, job.rescale);
-    fill_level(source, Level(0), job, |id, samples| BrickSummary {
-        range: job.rescale.values(range_of(samples)),
-        histogram: owned_histogram(samples, &job.layout, id, &table),
+    fill_level(source, Level(0), job, |id, samples| {
+        let stored = range_of(samples);
+        let histogram = owned_histogram(samples, &job.layout, id, stored, &table);
+        BrickSummary { range: job.rescale.values(stored), histogram }
     })
 }
 
@@ -164,7 +166,7 @@ fn fill_level<T: BrickScalar>(
         summary
     });
     let summaries = summaries.collect();
-    Ok(TreeLevel { samples: T::wrap(samples), summaries })
+    Ok(TreeLevel { samples: Arc::new(T::wrap(samples)), summaries })
 }
 
 fn zeroed<T: BrickScalar>(n: usize, level: Level) -> Result<Vec<T>, BuildError> {

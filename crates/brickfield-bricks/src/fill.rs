@@ -1,7 +1,7 @@
 //! One brick: its samples copied from a level, their range, and the histogram of the voxels it owns.
 
 use brickfield_core::glam::UVec3;
-use brickfield_core::{BrickId, BrickLayout, ValueRange};
+use brickfield_core::{BrickId, BrickLayout, BrickSide, ValueRange};
 
 use crate::bins::{BinTable, Histogram};
 use crate::downsample::Dense;
@@ -10,20 +10,33 @@ use crate::tally::Tally;
 
 /// Copies the brick's samples; samples beyond the level's border replicate the border sample.
 pub(crate) fn copy_brick<T: BrickScalar>(source: Dense<'_, T>, layout: &BrickLayout, id: BrickId, out: &mut [T]) {
-    let n = layout.side().n_samples() as usize;
-    let [x, y, z] = first_sample(layout, id).to_array().map(|i| i as usize);
-    let n_inside = n.min(source.dims.x as usize - x);
-    for (j, row) in out.chunks_exact_mut(n).enumerate() {
-        let from = source.row(y + j % n, z + j / n);
-        let (inside, beyond) = row.split_at_mut(n_inside);
-        inside.copy_from_slice(&from[x..x + n_inside]);
-        beyond.fill(from[from.len() - 1]);
+    let first = first_sample(layout, id);
+    match layout.side() {
+        BrickSide::S16 => copy_rows::<T, 16>(source, first, out),
+        BrickSide::S32 => copy_rows::<T, 32>(source, first, out),
+        BrickSide::S64 => copy_rows::<T, 64>(source, first, out),
+    }
+}
+
+fn copy_rows<T: BrickScalar, const N: usize>(source: Dense<'_, T>, first: UVec3, out: &mut [T]) {
+    let [x, y, z] = first.to_array().map(|i| i as usize);
+    for (j, row) in out.as_chunks_mut::<N>().0.iter_mut().enumerate() {
+        let from = &source.row(y + j % N, z + j / N)[x..];
+        // Rows of a known length are copied without a call.
+        if let Some(from) = from.first_chunk() {
+            *row = *from;
+        } else {
+            let (inside, beyond) = row.split_at_mut(from.len());
+            inside.copy_from_slice(from);
+            beyond.fill(from[from.len() - 1]);
+        }
     }
 }
 
 /// Least and greatest of all samples of a brick.
 pub(crate) fn range_of<T: BrickScalar>(samples: &[T]) -> ValueRange {
-    const LANES: usize = 16;
+    // So many that the loop over them is kept: compilers turn it into vectors.
+    const LANES: usize = 64;
     let (mut min, mut max) = ([samples[0]; LANES], [samples[0]; LANES]);
     for group in samples.as_chunks::<LANES>().0 {
         for lane in 0..LANES {
@@ -36,15 +49,23 @@ pub(crate) fn range_of<T: BrickScalar>(samples: &[T]) -> ValueRange {
     ValueRange { min: fold(min, f64::min).unwrap_or(0.0), max: fold(max, f64::max).unwrap_or(0.0) }
 }
 
-/// The histogram of the voxels that a level-0 brick owns: not its upper faces, except at the volume's border.
+/// The histogram of the voxels that a level-0 brick owns: not its upper faces, except at the volume's border. All its stored
+/// numbers are in `stored`.
 pub(crate) fn owned_histogram<T: BrickScalar>(
     samples: &[T],
     layout: &BrickLayout,
     id: BrickId,
+    stored: ValueRange,
     table: &BinTable,
 ) -> Histogram {
     let n = layout.side().n_samples() as usize;
     let [nx, ny, nz] = n_owned(layout, id).to_array().map(|i| i as usize);
+    let bins = [stored.min, stored.max].map(|stored| table.of(stored));
+    if bins[0] == bins[1] {
+        let mut histogram = Histogram::default();
+        histogram.counts[bins[0]] = (nx * ny * nz) as u64;
+        return histogram;
+    }
     let mut tally = Tally::default();
     for slice in samples.chunks_exact(n * n).take(nz) {
         for row in slice.chunks_exact(n).take(ny) {

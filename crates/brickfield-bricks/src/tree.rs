@@ -1,5 +1,6 @@
 //! The octree of bricks with its data.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use brickfield_core::{BrickId, BrickLayout, Grid, Level, Rescale, ScalarType, ValueRange, Voxels, with_voxels};
@@ -56,7 +57,7 @@ pub struct BrickSummary {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TreeLevel {
     /// The bricks one after the other, in the order of [`BrickLayout::ordinal`].
-    pub(crate) samples: Voxels,
+    pub(crate) samples: Arc<Voxels>,
     pub(crate) summaries: Vec<BrickSummary>,
 }
 
@@ -108,14 +109,14 @@ impl BrickTree {
     pub fn samples(&self, id: BrickId) -> BrickSamples<'_> {
         let n = self.layout.side().n_samples_total();
         let start = n * self.ordinal(id);
-        with_voxels!(&self.level(id.level).samples, v => BrickScalar::borrow(&v[start..start + n]))
+        with_voxels!(&*self.level(id.level).samples, v => BrickScalar::borrow(&v[start..start + n]))
     }
 
-    /// The samples of all bricks of a level, brick after brick in the order of [`BrickLayout::bricks`].
+    /// The samples of all bricks of a level, brick after brick in the order of [`BrickLayout::bricks`]; shared by all clones of the tree.
     ///
     /// # Panics
     /// If the layout has no such level.
-    pub fn level_samples(&self, level: Level) -> &Voxels {
+    pub fn level_samples(&self, level: Level) -> &Arc<Voxels> {
         &self.level(level).samples
     }
 

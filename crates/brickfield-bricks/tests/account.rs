@@ -91,7 +91,7 @@ fn the_account_is_what_the_tree_holds() {
     let tree = build_tree(&ramp(UVec3::new(40, 17, 50)), &options(BrickSide::S16)).unwrap();
     for (level, memory) in tree.memory().levels.iter().enumerate() {
         let level = Level(level as u8);
-        let n_bytes = with_voxels!(tree.level_samples(level), v => size_of_val(&v[..]));
+        let n_bytes = with_voxels!(&**tree.level_samples(level), v => size_of_val(&v[..]));
         assert_eq!(n_bytes as u64, memory.stored_bytes);
         assert_eq!(size_of_val(tree.summaries(level)) as u64, memory.summary_bytes);
     }

@@ -70,6 +70,8 @@ pub trait Scalar: Copy + Default + PartialOrd + Send + Sync + 'static + sealed::
     fn to_f64(self) -> f64;
     /// The nearest value of this type: integers round half away from zero and saturate.
     fn from_f64(value: f64) -> Self;
+    /// Whether the value is neither infinite nor NaN.
+    fn is_finite(self) -> bool;
     /// Wraps a vector of this type.
     fn wrap(values: Vec<Self>) -> Voxels;
     /// Writes numbers one after the other, little endian, as far as there are both.
@@ -81,7 +83,7 @@ mod sealed {
 }
 
 macro_rules! scalar {
-    ($($t:ident $v:ident $from:expr;)*) => { $(
+    ($($t:ident $v:ident $from:expr, $is_finite:expr;)*) => { $(
         impl sealed::Sealed for $t {}
         impl Scalar for $t {
             const TYPE: ScalarType = ScalarType::$v;
@@ -89,6 +91,8 @@ macro_rules! scalar {
             fn to_f64(self) -> f64 { f64::from(self) }
             #[inline]
             fn from_f64(value: f64) -> Self { $from(value) as $t }
+            #[inline]
+            fn is_finite(self) -> bool { $is_finite(self) }
             fn wrap(values: Vec<Self>) -> Voxels { Voxels::$v(values) }
             fn copy_le_bytes(values: &[Self], out: &mut [u8]) {
                 let (chunks, _) = out.as_chunks_mut::<{ size_of::<$t>() }>();
@@ -103,8 +107,10 @@ macro_rules! scalar {
     )* };
 }
 scalar! {
-    u8 U8 f64::round; i8 I8 f64::round; u16 U16 f64::round; i16 I16 f64::round;
-    u32 U32 f64::round; i32 I32 f64::round; f32 F32 std::convert::identity; f64 F64 std::convert::identity;
+    u8 U8 f64::round, |_| true; i8 I8 f64::round, |_| true;
+    u16 U16 f64::round, |_| true; i16 I16 f64::round, |_| true;
+    u32 U32 f64::round, |_| true; i32 I32 f64::round, |_| true;
+    f32 F32 std::convert::identity, f32::is_finite; f64 F64 std::convert::identity, f64::is_finite;
 }
 
 /// Voxels in their native type; x varies fastest, then y, then z.

@@ -127,6 +127,12 @@ impl TransferFunction {
         self.inside(range).iter().map(|k| k.extinction).fold(ends, f64::max)
     }
 
+    /// The least extinction over a closed range of values; above 0 only if everything in the range is visible.
+    pub fn least_extinction(&self, range: ValueRange) -> f64 {
+        let ends = self.at(range.min).extinction.min(self.at(range.max).extinction);
+        self.inside(range).iter().map(|k| k.extinction).fold(ends, f64::min)
+    }
+
     /// Whether a range of values contributes nothing: its extinction is 0 everywhere.
     pub fn is_transparent(&self, range: ValueRange) -> bool {
         let dark = |value| self.at(value).extinction == 0.0;
@@ -214,6 +220,8 @@ mod tests {
         let transparent = |min, max| tf.is_transparent(ValueRange { min, max });
         assert!(transparent(0.0, 10.0) && transparent(12.0, 99.0));
         assert!(!transparent(0.0, 10.1) && !transparent(0.0, 99.0));
+        let least = |min, max| tf.least_extinction(ValueRange { min, max });
+        assert_eq!([least(10.5, 11.25), least(10.5, 12.0), least(0.0, 99.0)], [0.5, 0.0, 0.0]);
     }
 
     #[test]

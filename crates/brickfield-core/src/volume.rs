@@ -148,9 +148,22 @@ impl Volume {
 }
 
 fn finite_range<T: Scalar>(values: &[T]) -> ValueRange {
-    let mut lanes = values.iter().map(|v| v.to_f64()).filter(|v| v.is_finite());
-    let Some(first) = lanes.next() else { return ValueRange { min: 0.0, max: 0.0 } };
-    lanes.fold(ValueRange { min: first, max: first }, |r, v| ValueRange { min: r.min.min(v), max: r.max.max(v) })
+    // So many that the loop over them is kept: compilers turn it into vectors.
+    const LANES: usize = 64;
+    let Some(first) = values.iter().copied().find(|v| v.is_finite()) else {
+        return ValueRange { min: 0.0, max: 0.0 };
+    };
+    let (mut min, mut max) = ([first; LANES], [first; LANES]);
+    let mut widen = |lane: usize, v: T| {
+        let v = if v.is_finite() { v } else { first };
+        min[lane] = if v < min[lane] { v } else { min[lane] };
+        max[lane] = if v > max[lane] { v } else { max[lane] };
+    };
+    let (groups, rest) = values.as_chunks::<LANES>();
+    groups.iter().for_each(|group| (0..LANES).for_each(|lane| widen(lane, group[lane])));
+    rest.iter().for_each(|v| widen(0, *v));
+    let ends = min.into_iter().chain(max).map(T::to_f64);
+    ValueRange::of(ends).expect("the first one is finite")
 }
 
 fn replace_non_finite<T: Scalar>(values: &mut [T], range: ValueRange) -> NonFinite {

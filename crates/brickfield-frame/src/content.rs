@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use brickfield_core::glam::UVec3;
+use bytes::Bytes;
 
 use crate::{PackedSamples, SampleFormat, Upload};
 
@@ -27,26 +28,33 @@ impl ContentId {
 #[derive(Debug)]
 pub struct Chunk {
     id: ContentId,
-    bytes: Box<[u8]>,
+    bytes: Bytes,
     packed: Option<PackedSamples>,
 }
 
 impl Chunk {
     /// A new content.
     pub fn new(bytes: impl Into<Box<[u8]>>) -> Chunk {
-        Chunk { id: ContentId::new(), bytes: bytes.into(), packed: None }
+        Chunk::shared(Bytes::from(bytes.into()))
+    }
+
+    /// A new content of bytes that others may hold, too. Nothing is copied; what the bytes are a part of stays in memory as a whole.
+    pub fn shared(bytes: Bytes) -> Chunk {
+        Chunk { id: ContentId::new(), bytes, packed: None }
     }
 
     /// The samples of a slot, x of the texture fastest, as a device is to be brought them. With losses, they are the samples that come
     /// back.
-    pub fn of_samples(extent: UVec3, format: SampleFormat, samples: Vec<u8>, upload: Upload) -> Chunk {
+    pub fn of_samples(extent: UVec3, format: SampleFormat, samples: Bytes, upload: Upload) -> Chunk {
         let packed = match upload {
             Upload::Plain => None,
             Upload::Packed { max_error } => PackedSamples::of(extent, format, &samples, max_error),
         };
         match packed {
-            None => Chunk::new(samples),
-            Some((packed, restored)) => Chunk { packed: Some(packed), ..Chunk::new(restored.unwrap_or(samples)) },
+            None => Chunk::shared(samples),
+            Some((packed, restored)) => {
+                Chunk { packed: Some(packed), ..Chunk::shared(restored.map_or(samples, Bytes::from)) }
+            }
         }
     }
 

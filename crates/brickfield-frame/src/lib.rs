@@ -53,7 +53,9 @@ pub use proxy::{ProxyCorner, ProxyGeometry, Slices, Target};
 pub use rays::{PlanRay, RayFrame};
 pub use resource::{Content, Resource};
 pub use sampling::{Division, Lengths, Mode, Sampling, SamplingError};
-pub use skip::{Beams, DarkError, DarkRegions, KeptBoxes, MACROCELL_SIDE, MacrocellRanges, Occupancy, Overview};
+pub use skip::{
+    Beams, DarkError, DarkRegions, DarkRuns, KeptBoxes, MACROCELL_SIDE, MacrocellRanges, Occupancy, Overview,
+};
 pub use spoil::SpoiltPlan;
 pub use surfaces::{Placement, PlacementError, PlaneStacks, Steps};
 pub use uniform::{FEW_KNOTS, FrameUniforms, KnotUniform, PlaceUniform};

@@ -15,8 +15,8 @@ pub(crate) struct Texture {
     held: HeldChunks,
 }
 
-/// Bytes that are handed over before the device may go on with them.
-const BYTES_AT_ONCE: usize = 64 << 20;
+/// Bytes that are handed over before the device may go on with them: so few that they stay in the caches of the host.
+const BYTES_AT_ONCE: usize = 8 << 20;
 
 impl Texture {
     /// How bricks lie in it.

@@ -1,8 +1,11 @@
 //! From samples as they are stored to samples as a backend reads them.
 
+use std::sync::Arc;
+
 use brickfield_core::glam::UVec3;
-use brickfield_core::{Rescale, ScalarType, ValueRange};
+use brickfield_core::{Rescale, ScalarType, ValueRange, Voxels, with_voxels};
 use brickfield_frame::{Chunk, Decode, SampleFormat, Upload};
+use bytes::Bytes;
 
 /// How the samples of a source are held for a backend.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +39,28 @@ impl Coding {
     /// Little-endian samples, x fastest, in the form of a backend.
     pub(crate) fn chunk(&self, extent: UVec3, bytes: Vec<u8>) -> Chunk {
         let samples = encode(bytes, self.scalar, self.format, self.stored);
+        self.chunk_of_encoded(extent, samples.into())
+    }
+
+    /// Samples that are in the form of a backend.
+    pub(crate) fn chunk_of_encoded(&self, extent: UVec3, samples: Bytes) -> Chunk {
         Chunk::of_samples(extent, self.format, samples, self.upload)
+    }
+
+    /// The bytes of samples whose form is that of a backend: nothing is copied. `None` of all others.
+    pub(crate) fn as_stored(&self, samples: &Arc<Voxels>) -> Option<Bytes> {
+        let is_stored =
+            self.scalar == ScalarType::U8 || self.scalar == ScalarType::U16 && cfg!(target_endian = "little");
+        is_stored.then(|| Bytes::from_owner(Stored(samples.clone())))
+    }
+}
+
+/// Samples as bytes in the order of the machine.
+struct Stored(Arc<Voxels>);
+
+impl AsRef<[u8]> for Stored {
+    fn as_ref(&self) -> &[u8] {
+        with_voxels!(&*self.0, v => bytemuck::cast_slice(v))
     }
 }
 
@@ -63,10 +87,10 @@ fn encode_f32<const N: usize>(
     number: impl Fn([u8; N]) -> f64,
 ) -> Vec<u8> {
     let (samples, _) = bytes.as_chunks::<N>();
-    let mut out = Vec::with_capacity(samples.len() * format.n_bytes());
-    for sample in samples {
+    let mut out = vec![0; samples.len() * format.n_bytes()];
+    for (sample, out) in samples.iter().zip(out.as_chunks_mut().0) {
         let read = (number(*sample) - decode.offset) / decode.scale;
-        out.extend((read as f32).to_le_bytes());
+        *out = (read as f32).to_le_bytes();
     }
     out
 }

@@ -130,7 +130,7 @@ fn plan_selection(
     let field = residency.hold(tree, resident);
     // The interior of bricks is not looked at before polygons are drawn.
     let dark = match (scene.skipping, scene.technique) {
-        (Skipping::On, Technique::RayCasting) => residency.dark(&scene.transfer),
+        (Skipping::On, Technique::RayCasting) => residency.dark(tree, &scene.transfer),
         _ => DarkRegions::default(),
     };
     let parts = PlanParts::new(field, rays, domain, sampling, scene.transfer.clone());

@@ -7,9 +7,10 @@ use brickfield_bricks::{BrickTree, TreeId};
 use brickfield_core::glam::UVec3;
 use brickfield_core::{BrickId, Level, TransferFunction};
 use brickfield_frame::{
-    Chunk, DarkRegions, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, MacrocellRanges, Occupancy,
-    Places, Reach, Slots, Upload,
+    Chunk, DarkRegions, DarkRuns, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join, MacrocellRanges,
+    Occupancy, Places, Reach, Slots, Upload,
 };
+use bytes::Bytes;
 use rayon::prelude::*;
 
 use crate::Scene;
@@ -17,7 +18,8 @@ use crate::encode::Coding;
 
 /// The bricks of the last frame, in their slots, and the ranges and distances of their macrocells.
 ///
-/// A frame that needs another brick copies that brick alone; a scene that is drawn again costs nothing.
+/// A frame that needs another brick takes that brick alone from the tree; a scene that is drawn again costs nothing. Samples of u8 and
+/// u16 are shared with the tree, and keep its levels in memory; all others are copied into the form of backends.
 /// One residency serves one tree at a time: handed another, it begins anew.
 #[derive(Debug, Default)]
 pub struct Residency {
@@ -31,7 +33,7 @@ pub struct Residency {
     copied: Copied,
 }
 
-/// The bricks that a frame copied from the tree.
+/// The bricks that a frame took from the tree, and the bytes of their samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub struct Copied {
@@ -51,6 +53,8 @@ struct SlotTable {
     /// Under the transfer function `of`.
     distances: Vec<Option<Arc<Chunk>>>,
     of: Option<TransferFunction>,
+    /// The distances of each brick that is visible throughout.
+    all_visible: Option<Arc<Chunk>>,
 }
 
 /// Which bricks of a tree a transfer function makes transparent: the levels that were asked for.
@@ -66,7 +70,7 @@ impl Residency {
         &self.table.bricks
     }
 
-    /// The bricks that the last frame copied.
+    /// The bricks that the last frame took from the tree.
     pub fn copied(&self) -> Copied {
         self.copied
     }
@@ -102,7 +106,8 @@ impl Residency {
         }
         let range = tree.summary(tree.layout().root()).range;
         let coding = Coding::of(tree.scalar_type(), tree.rescale(), range).brought(self.upload);
-        self.copied = self.table.hold(bricks, |id| gather(tree, id, &coding));
+        let source = Source::new(tree, &coding);
+        self.copied = self.table.hold(bricks, |id| source.chunk(id));
         let side = tree.layout().side();
         let slots = Slots::new(coding.format, coding.decode(), Places::Even(side), self.table.samples.clone());
         let index = self.table.index(tree);
@@ -122,13 +127,13 @@ impl Residency {
     }
 
     /// The regions of the held field that a transfer function makes dark.
-    pub(crate) fn dark(&mut self, transfer: &TransferFunction) -> DarkRegions {
+    pub(crate) fn dark(&mut self, tree: &BrickTree, transfer: &TransferFunction) -> DarkRegions {
         let Some(field) = &self.field else { return DarkRegions::default() };
         let is_known = self.table.of.as_ref() == Some(transfer);
         if let Some(dark) = self.dark.as_ref().filter(|dark| is_known && dark.is_of(field)) {
             return dark.clone();
         }
-        let occupancy = self.table.occupancy(field.slots(), transfer);
+        let occupancy = self.table.occupancy(tree, field.slots(), transfer);
         let dark = DarkRegions::new(field, occupancy).expect("distances of the field's own bricks");
         self.dark = Some(dark.clone());
         dark
@@ -197,18 +202,24 @@ impl SlotTable {
     }
 
     /// The dark macrocells under a transfer function; `None` if there are none, or too many macrocells for a map.
-    fn occupancy(&mut self, slots: &Slots, transfer: &TransferFunction) -> Option<Arc<Occupancy>> {
+    fn occupancy(&mut self, tree: &BrickTree, slots: &Slots, transfer: &TransferFunction) -> Option<Arc<Occupancy>> {
         let side = slots.brick_side().filter(|side| Occupancy::fits(*side, slots.n_slots()))?;
         if self.of.as_ref() != Some(transfer) {
             self.distances.fill(None);
             self.of = Some(transfer.clone());
         }
-        let (format, decode) = (slots.format(), slots.decode());
+        let (format, runs) = (slots.format(), DarkRuns::of_transfer(transfer, slots.format(), slots.decode()));
+        let all_visible = self.all_visible.get_or_insert_with(|| Arc::new(Occupancy::of_visible_brick(side)));
+        for (id, slot) in &self.slot_of {
+            if transfer.least_extinction(tree.summary(*id).range) > 0.0 {
+                self.distances[*slot as usize].get_or_insert_with(|| all_visible.clone());
+            }
+        }
         let lists = self.samples.par_iter().zip(&mut self.ranges).zip(&mut self.distances);
         lists.for_each(|((samples, ranges), distances)| {
-            let Some(samples) = samples else { return };
+            let (Some(samples), None) = (samples, &distances) else { return };
             let ranges = ranges.get_or_insert_with(|| Arc::new(MacrocellRanges::of(side, format, samples.bytes())));
-            distances.get_or_insert_with(|| Arc::new(ranges.distances(decode, transfer)));
+            *distances = Some(Arc::new(ranges.distances(&runs)));
         });
         Occupancy::new(side, self.distances.clone())
     }
@@ -225,10 +236,30 @@ impl Transparent {
     }
 }
 
-/// A brick's samples in the form of a backend.
-fn gather(tree: &BrickTree, id: BrickId, coding: &Coding) -> Chunk {
-    let samples = tree.samples(id);
-    let mut bytes = vec![0; samples.n_bytes()];
-    samples.copy_le_bytes(&mut bytes);
-    coding.chunk(UVec3::splat(tree.layout().side().n_samples()), bytes)
+/// Where the samples of bricks come from.
+struct Source<'a> {
+    tree: &'a BrickTree,
+    coding: &'a Coding,
+    /// By level, the samples of all bricks, if their form is that of a backend.
+    stored: Vec<Option<Bytes>>,
+}
+
+impl Source<'_> {
+    fn new<'a>(tree: &'a BrickTree, coding: &'a Coding) -> Source<'a> {
+        let levels = (0..tree.layout().n_levels()).map(Level);
+        Source { tree, coding, stored: levels.map(|level| coding.as_stored(tree.level_samples(level))).collect() }
+    }
+
+    /// A brick's samples in the form of a backend: the tree's own, or a copy.
+    fn chunk(&self, id: BrickId) -> Chunk {
+        let (layout, n_bytes) = (self.tree.layout(), self.tree.n_brick_bytes());
+        let extent = UVec3::splat(layout.side().n_samples());
+        if let Some(stored) = &self.stored[usize::from(id.level.0)] {
+            let start = n_bytes * layout.ordinal(id);
+            return self.coding.chunk_of_encoded(extent, stored.slice(start..start + n_bytes));
+        }
+        let mut bytes = vec![0; n_bytes];
+        self.tree.samples(id).copy_le_bytes(&mut bytes);
+        self.coding.chunk(extent, bytes)
+    }
 }

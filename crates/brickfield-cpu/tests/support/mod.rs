@@ -8,9 +8,9 @@ use brickfield_core::{
     Aabb, BrickId, BrickLayout, BrickSide, Camera, Grid, Knot, Level, Projection, ScalarType, TransferFunction, Volume,
 };
 use brickfield_frame::{
-    Chunk, DarkRegions, Decode, Division, Drawing, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice, Join,
-    Lengths, MacrocellRanges, Mode, Occupancy, Placement, Places, PlanParts, RayFrame, Reach, SampleFormat, Sampling,
-    Sequence, Slots, Steps,
+    Chunk, DarkRegions, DarkRuns, Decode, Division, Drawing, Field, FramePlan, IndexEntry, IndexGrid, IndexLattice,
+    Join, Lengths, MacrocellRanges, Mode, Occupancy, Placement, Places, PlanParts, RayFrame, Reach, SampleFormat,
+    Sampling, Sequence, Slots, Steps,
 };
 use brickfield_optics::QuadratureRule;
 
@@ -133,10 +133,9 @@ fn cut(setup: &Setup) -> Field {
 fn occupancy(field: &Field, transfer: &TransferFunction) -> Option<Arc<Occupancy>> {
     let slots = field.slots();
     let side = slots.brick_side()?;
-    let distances = |chunk: &Arc<Chunk>| {
-        let ranges = MacrocellRanges::of(side, slots.format(), chunk.bytes());
-        Arc::new(ranges.distances(slots.decode(), transfer))
-    };
+    let dark = DarkRuns::of_transfer(transfer, slots.format(), slots.decode());
+    let distances =
+        |chunk: &Arc<Chunk>| Arc::new(MacrocellRanges::of(side, slots.format(), chunk.bytes()).distances(&dark));
     Occupancy::new(side, slots.all_samples().iter().map(|chunk| chunk.as_ref().map(distances)).collect())
 }
 

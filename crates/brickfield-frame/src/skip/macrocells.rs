@@ -1,9 +1,9 @@
 //! The ranges of the macrocells of a brick, and which of them are visible under a transfer function.
 
-use brickfield_core::{BrickSide, TransferFunction, ValueRange};
+use brickfield_core::BrickSide;
 
-use super::{MACROCELL_SIDE, Occupancy};
-use crate::{Chunk, Decode, SampleFormat};
+use super::{DarkRuns, MACROCELL_SIDE, Occupancy};
+use crate::{Chunk, SampleFormat};
 
 /// The data values' ranges over the macrocells of a brick, x fastest. A quarter of the brick's bytes.
 #[derive(Clone, Debug)]
@@ -15,9 +15,15 @@ pub struct MacrocellRanges {
 /// The least and the greatest stored number of each macrocell.
 #[derive(Clone, Debug)]
 enum StoredRanges {
-    Unorm8(Box<[[u8; 2]]>),
-    Unorm16(Box<[[u16; 2]]>),
-    Float32(Box<[[f32; 2]]>),
+    Unorm8(Ranges<u8>),
+    Unorm16(Ranges<u16>),
+    Float32(Ranges<f32>),
+}
+
+#[derive(Clone, Debug)]
+struct Ranges<T> {
+    least: Box<[T]>,
+    greatest: Box<[T]>,
 }
 
 impl MacrocellRanges {
@@ -36,70 +42,103 @@ impl MacrocellRanges {
         MacrocellRanges { side, stored }
     }
 
-    /// How far each macrocell is from the nearest one of the other kind, visible or dark, under a transfer function.
-    pub fn distances(&self, decode: Decode, transfer: &TransferFunction) -> Chunk {
+    /// How far each macrocell is from the nearest one of the other kind, visible or dark, where a transfer function is 0 over runs of
+    /// stored numbers.
+    pub fn distances(&self, dark: &DarkRuns) -> Chunk {
         let visible = match &self.stored {
-            StoredRanges::Unorm8(ranges) => visible(ranges, SampleFormat::Unorm8, decode, transfer),
-            StoredRanges::Unorm16(ranges) => visible(ranges, SampleFormat::Unorm16, decode, transfer),
-            StoredRanges::Float32(ranges) => visible(ranges, SampleFormat::Float32, decode, transfer),
+            StoredRanges::Unorm8(ranges) => ranges.visible(&dark.of(|stored| stored as u8)),
+            StoredRanges::Unorm16(ranges) => ranges.visible(&dark.of(|stored| stored as u16)),
+            StoredRanges::Float32(ranges) => ranges.visible(&dark.of(|stored| stored as f32)),
         };
         Occupancy::of_brick(self.side, &visible)
     }
 }
 
-fn visible<T: Copy + Into<f64>>(
-    ranges: &[[T; 2]],
-    format: SampleFormat,
-    decode: Decode,
-    transfer: &TransferFunction,
-) -> Vec<bool> {
-    let value = |stored: T| decode.value(stored.into() / format.unit());
-    let is_visible = |[min, max]: &[T; 2]| {
-        // A decoding's scale may be negative.
-        let (a, b) = (value(*min), value(*max));
-        !transfer.is_transparent(ValueRange { min: a.min(b), max: a.max(b) })
-    };
-    ranges.iter().map(is_visible).collect()
-}
+/// Runs that are compared with each range, one after the other; of more the one that matters is searched.
+const FEW_RUNS: usize = 4;
 
-/// The ranges of a brick whose samples `read` makes of their bytes.
-fn ranges<T, const N_BYTES: usize>(side: BrickSide, bytes: &[u8], read: impl Fn([u8; N_BYTES]) -> T) -> Box<[[T; 2]]>
-where
-    T: Copy + Default + PartialOrd,
-{
-    let (chunks, _) = bytes.as_chunks();
-    let samples: Vec<T> = chunks.iter().map(|b| read(*b)).collect();
-    let mut out = vec![[T::default(); 2]; Occupancy::n_macrocells_total(side)];
-    of_brick(&samples, side.n_samples() as usize, &mut out);
-    out.into()
-}
-
-/// The ranges of one brick's macrocells. A macrocell has the samples at both ends of its cells: 3 along an axis.
-fn of_brick<T: Copy + PartialOrd>(samples: &[T], n: usize, out: &mut [[T; 2]]) {
-    let side = MACROCELL_SIDE as usize;
-    let within = |macrocell: usize| macrocell * side..=(macrocell * side + side).min(n - 1);
-    let n_macrocells = n / side;
-    let mut row = Vec::with_capacity(n);
-    for (i, out) in out.chunks_exact_mut(n_macrocells).enumerate() {
-        // The range over all rows of samples that this row of macrocells touches, sample by sample.
-        let rows = within(i / n_macrocells).flat_map(|z| within(i % n_macrocells).map(move |y| (z * n + y) * n));
-        let rows = rows.map(|first| &samples[first..first + n]);
-        row.clear();
-        for samples in rows {
-            if row.is_empty() {
-                row.extend(samples.iter().map(|s| [*s; 2]));
+impl<T: Copy + PartialOrd> Ranges<T> {
+    /// Which macrocells have a range that is not in one of the runs, which ascend.
+    fn visible(&self, runs: &[[T; 2]]) -> Vec<bool> {
+        let ranges = || self.least.iter().zip(&self.greatest);
+        if runs.len() > FEW_RUNS {
+            let last_from = |least: T| runs[..runs.partition_point(|[first, _]| *first <= least)].last();
+            return ranges().map(|(min, max)| last_from(*min).is_none_or(|[_, last]| *max > *last)).collect();
+        }
+        let mut visible = vec![true; self.least.len()];
+        for [first, last] in runs {
+            for (visible, (min, max)) in visible.iter_mut().zip(ranges()) {
+                *visible &= (*min < *first) | (*max > *last);
             }
-            row.iter_mut().zip(samples).for_each(|(range, s)| *range = widened(*range, [*s; 2]));
         }
-        for (x, out) in out.iter_mut().enumerate() {
-            let samples = &row[within(x)];
-            *out = samples[1..].iter().fold(samples[0], |range, s| widened(range, *s));
-        }
+        visible
     }
 }
 
-fn widened<T: Copy + PartialOrd>([min, max]: [T; 2], [a, b]: [T; 2]) -> [T; 2] {
-    [if a < min { a } else { min }, if b > max { b } else { max }]
+/// The ranges of a brick whose samples `read` makes of their bytes.
+fn ranges<T, const N_BYTES: usize>(side: BrickSide, bytes: &[u8], read: impl Fn([u8; N_BYTES]) -> T) -> Ranges<T>
+where
+    T: Copy + Default + PartialOrd,
+{
+    let (samples, _) = bytes.as_chunks();
+    match side {
+        BrickSide::S16 => of_brick::<T, N_BYTES, 16>(samples, read),
+        BrickSide::S32 => of_brick::<T, N_BYTES, 32>(samples, read),
+        BrickSide::S64 => of_brick::<T, N_BYTES, 64>(samples, read),
+    }
+}
+
+/// The ranges of one brick's macrocells. A macrocell has the samples at both ends of its cells: 3 along an axis.
+fn of_brick<T, const N_BYTES: usize, const N: usize>(
+    samples: &[[u8; N_BYTES]],
+    read: impl Fn([u8; N_BYTES]) -> T,
+) -> Ranges<T>
+where
+    T: Copy + Default + PartialOrd,
+{
+    let side = MACROCELL_SIDE as usize;
+    let (n_macrocells, (rows, _)) = (N / side, samples.as_chunks::<N>());
+    let within = |macrocell: usize| macrocell * side..=(macrocell * side + side).min(N - 1);
+    let new = || vec![T::default(); n_macrocells.pow(3)].into_boxed_slice();
+    let (mut least, mut greatest) = (new(), new());
+    let out = least.chunks_exact_mut(n_macrocells).zip(greatest.chunks_exact_mut(n_macrocells));
+    for (i, (least, greatest)) in out.enumerate() {
+        // The range over all rows of samples that this row of macrocells touches, sample by sample.
+        let (first_y, first_z) = (i % n_macrocells * side, i / n_macrocells * side);
+        let mut min = rows[first_z * N + first_y].map(&read);
+        let mut max = min;
+        for row in within(i / n_macrocells).flat_map(|z| within(i % n_macrocells).map(move |y| &rows[z * N + y])) {
+            for x in 0..N {
+                let sample = read(row[x]);
+                min[x] = lesser(min[x], sample);
+                max[x] = greater(max[x], sample);
+            }
+        }
+        along_row(&min, least, lesser);
+        along_row(&max, greatest, greater);
+    }
+    Ranges { least, greatest }
+}
+
+/// What `pick` leaves of the samples of each macrocell of a row.
+fn along_row<T: Copy, const N: usize>(row: &[T; N], out: &mut [T], pick: impl Fn(T, T) -> T) {
+    let (pairs, _) = row.as_chunks::<{ MACROCELL_SIDE as usize }>();
+    let (last, others) = out.split_last_mut().expect("a brick has macrocells");
+    for (i, out) in others.iter_mut().enumerate() {
+        *out = pick(pick(pairs[i][0], pairs[i][1]), pairs[i + 1][0]);
+    }
+    let [a, b] = pairs[pairs.len() - 1];
+    *last = pick(a, b);
+}
+
+#[inline(always)]
+fn lesser<T: Copy + PartialOrd>(a: T, b: T) -> T {
+    if b < a { b } else { a }
+}
+
+#[inline(always)]
+fn greater<T: Copy + PartialOrd>(a: T, b: T) -> T {
+    if b > a { b } else { a }
 }
 
 #[cfg(test)]
@@ -110,16 +149,29 @@ mod tests {
     fn ranges_span_the_samples_of_their_cells() {
         let n = 16usize;
         let samples: Vec<u16> = (0..n.pow(3)).map(|i| ((i * 7919) % 4001) as u16).collect();
-        let mut ranges = vec![[0; 2]; 512];
-        of_brick(&samples, n, &mut ranges);
-        for (i, range) in ranges.into_iter().enumerate() {
+        let bytes: Vec<[u8; 2]> = samples.iter().map(|s| s.to_le_bytes()).collect();
+        let ranges = of_brick::<u16, 2, 16>(&bytes, u16::from_le_bytes);
+        for i in 0..512 {
             let first = [i % 8, i / 8 % 8, i / 64].map(|m| 2 * m);
             let near = |j: &usize| {
                 let at = [j % n, j / n % n, j / n / n];
                 at.into_iter().zip(first).all(|(at, first)| (first..=first + 2).contains(&at))
             };
             let of_cells = || (0..samples.len()).filter(near).map(|j| samples[j]);
-            assert_eq!(range, [of_cells().min().unwrap(), of_cells().max().unwrap()]);
+            let expected = (of_cells().min().unwrap(), of_cells().max().unwrap());
+            assert_eq!((ranges.least[i], ranges.greatest[i]), expected);
         }
+    }
+
+    #[test]
+    fn few_runs_and_many_hide_the_same_macrocells() {
+        let ranges = Ranges { least: (0..90u8).collect(), greatest: (0..90).map(|i| i + i % 4).collect() };
+        let runs: Vec<[u8; 2]> = (0..9).map(|i| [10 * i, 10 * i + i]).collect();
+        let mut expected = vec![true; 90];
+        for few in runs.chunks(FEW_RUNS) {
+            ranges.visible(few).into_iter().zip(&mut expected).for_each(|(visible, of_all)| *of_all &= visible);
+        }
+        assert!(expected.contains(&false) && ranges.visible(&runs) == expected);
+        assert_eq!(ranges.visible(&[]), [true; 90]);
     }
 }

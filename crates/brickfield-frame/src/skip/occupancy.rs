@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use brickfield_core::BrickSide;
 
-use super::chebyshev;
 use crate::{Chunk, Chunked, ContentId};
 
 /// Cells along a macrocell's side, whatever the brick's level: 8^3 macrocells in a brick of 16^3 samples, 32^3 in one of 64^3.
@@ -55,8 +54,14 @@ impl Occupancy {
     pub fn of_brick(side: BrickSide, visible: &[bool]) -> Chunk {
         assert_eq!(visible.len(), Occupancy::n_macrocells_total(side), "macrocells of a brick of {side}");
         let mut distances = vec![0; visible.len()];
-        spread(visible, Occupancy::n_macrocells(side) as usize, &mut distances);
-        Chunk::new(bytemuck::cast_slice::<i8, u8>(&distances))
+        spread(visible, Occupancy::n_macrocells(side) as usize, bytemuck::cast_slice_mut(&mut distances));
+        Chunk::new(distances)
+    }
+
+    /// The distances in a brick that is visible throughout.
+    pub fn of_visible_brick(side: BrickSide) -> Chunk {
+        let distance = -(Occupancy::n_macrocells(side) as i8);
+        Chunk::new(vec![distance as u8; Occupancy::n_macrocells_total(side)])
     }
 
     /// The map of bricks by their slots, each [`of_brick`](Self::of_brick).
@@ -68,9 +73,7 @@ impl Occupancy {
     pub fn new(side: BrickSide, bricks: Vec<Option<Arc<Chunk>>>) -> Option<Arc<Occupancy>> {
         let n = Occupancy::n_macrocells_total(side);
         assert!(bricks.iter().flatten().all(|b| b.bytes().len() == n), "distances of bricks of {side}");
-        // In a brick of one kind all distances are equal.
-        let is_dark = |brick: &Arc<Chunk>| brick.bytes().iter().any(|d| *d as i8 > 0);
-        let any_dark = bricks.iter().flatten().any(is_dark);
+        let any_dark = bricks.iter().flatten().any(|brick| !is_all_visible(side, bytemuck::cast_slice(brick.bytes())));
         any_dark.then(|| Arc::new(Occupancy { side, bricks, id: ContentId::new() }))
     }
 
@@ -113,18 +116,69 @@ impl Chunked for Occupancy {
     }
 }
 
-/// The distances of the macrocells of one brick, `n` along a side.
+/// Whether distances are those of a brick that is visible throughout: in all others they are less than the brick's width.
+#[inline]
+pub(super) fn is_all_visible(side: BrickSide, distances: &[i8]) -> bool {
+    i32::from(distances[0]) == -(Occupancy::n_macrocells(side) as i32)
+}
+
+/// The distances of the macrocells of one brick, `n` along a side: a multiple of 8, at most 32.
 fn spread(visible: &[bool], n: usize, out: &mut [i8]) {
-    let far = n as u8;
-    let to = |kind: bool| {
-        let mut distances: Vec<u8> = visible.iter().map(|v| if *v == kind { 0 } else { far }).collect();
-        chebyshev::spread(&mut distances, [n; 3], far);
-        distances
-    };
-    let (to_visible, to_dark) = (to(true), to(false));
-    for (out, (visible, dark)) in out.iter_mut().zip(to_visible.into_iter().zip(to_dark)) {
-        // One of them is 0; n is at most 32.
-        *out = visible as i8 - dark as i8;
+    let dark: Vec<u32> =
+        visible.chunks_exact(n).map(|row| row.iter().rev().fold(0, |w, v| w << 1 | u32::from(!v))).collect();
+    let whole_row = u32::MAX >> (32 - n);
+    let visible = dark.iter().map(|row| row ^ whole_row).collect();
+    peel(dark, n, out, i8::wrapping_add);
+    peel(visible, n, out, i8::wrapping_sub);
+}
+
+/// Counts for each cell of a set how often the set's surface can be taken off until the cell is gone: its distance to the nearest cell
+/// that is not in the set; `n` if there is none.
+///
+/// A word is a row of `n` cells, with bit x for cell x.
+///
+/// ```text
+/// # # # # #        # # # # .        # # # . .
+/// # # # # #        # # # . .        # # . . .       4 3 2 1
+/// # # # # .   ->   # # . . .   ->   # . . . .       of the last row
+/// ```
+fn peel(mut set: Vec<u32>, n: usize, out: &mut [i8], count: impl Fn(i8, i8) -> i8) {
+    let mut below = vec![0; set.len()];
+    for _ in 0..n {
+        if set.iter().all(|row| *row == 0) {
+            return;
+        }
+        for (row, out) in set.iter().zip(out.chunks_exact_mut(n)) {
+            for (eight, out) in row.to_le_bytes().iter().zip(out.as_chunks_mut::<8>().0) {
+                *out = std::array::from_fn(|x| count(out[x], BITS[usize::from(*eight)][x]));
+            }
+        }
+        take_surface_off(&mut set, &mut below, n);
+    }
+}
+
+/// The bits of each byte, from the lowest on.
+const BITS: [[i8; 8]; 256] = {
+    let mut bits = [[0; 8]; 256];
+    let mut i = 0;
+    while i < 256 * 8 {
+        bits[i / 8][i % 8] = ((i / 8) >> (i % 8) & 1) as i8;
+        i += 1;
+    }
+    bits
+};
+
+/// Leaves the cells whose neighbours in the brick are all in the set.
+fn take_surface_off(set: &mut [u32], before: &mut [u32], n: usize) {
+    set.iter_mut().for_each(|row| *row &= (*row << 1 | 1) & (*row >> 1 | 1 << (n - 1)));
+    for piece in [n, n * n] {
+        // Rows of a layer, then layers.
+        let stride = piece / n;
+        before.copy_from_slice(set);
+        for (own, before) in set.chunks_exact_mut(piece).zip(before.chunks_exact(piece)) {
+            own[stride..].iter_mut().zip(before).for_each(|(row, other)| *row &= other);
+            own.iter_mut().zip(&before[stride..]).for_each(|(row, other)| *row &= other);
+        }
     }
 }
 

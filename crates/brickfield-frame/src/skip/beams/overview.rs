@@ -4,11 +4,13 @@ use brickfield_core::BrickSide;
 use brickfield_core::glam::{UVec3, Vec3A};
 use rayon::prelude::*;
 
-use super::super::chebyshev;
+use super::super::{chebyshev, occupancy::is_all_visible};
 use crate::{IndexEntry, IndexGrid, MACROCELL_SIDE, Occupancy, Reach};
 
 /// Most cells of a lattice: 128^3.
 const MAX_CELLS: usize = 1 << 21;
+/// Most macrocells along a brick's side.
+const MAX_MACROCELLS: usize = Occupancy::n_macrocells(BrickSide::S64) as usize;
 /// Cells that a distance can tell; farther ones are as if that far away.
 const FARTHEST: u8 = 32;
 
@@ -47,18 +49,23 @@ impl Lattice {
     /// Sets the cells of a brick of level 0 that hold visible macrocells to 0; all of them if nothing is known of its
     /// macrocells. Rows and layers of cells are so far apart.
     fn mark_fine(&self, cells: &mut [u8], [row, layer]: [usize; 2], distances: Option<&[i8]>) {
-        let n = self.n_macrocells as usize;
-        let Some(distances) = distances else {
-            let n_cells = n >> self.shift;
-            for (z, y) in (0..n_cells).flat_map(|z| (0..n_cells).map(move |y| (z, y))) {
-                cells[z * layer + y * row..][..n_cells].fill(0);
+        let (n, side) = (self.n_macrocells as usize, 1 << self.shift);
+        let n_cells = n >> self.shift;
+        for (z, y) in (0..n_cells).flat_map(|z| (0..n_cells).map(move |y| (z, y))) {
+            let cells = &mut cells[z * layer + y * row..][..n_cells];
+            let Some(distances) = distances else {
+                cells.fill(0);
+                continue;
+            };
+            // The sign of a cell's macrocells: negative if one of them is.
+            let mut signs = [0; MAX_MACROCELLS];
+            for i in (0..side).flat_map(|j| (0..side).map(move |k| (z * side + j) * n + y * side + k)) {
+                signs.iter_mut().zip(&distances[i * n..][..n]).for_each(|(sign, d)| *sign |= d);
             }
-            return;
-        };
-        for (i, distances) in distances.chunks_exact(n).enumerate() {
-            let cells = &mut cells[((i / n) >> self.shift) * layer + ((i % n) >> self.shift) * row..];
-            for (x, _) in distances.iter().enumerate().filter(|(_, d)| **d < 0) {
-                cells[x >> self.shift] = 0;
+            for (cell, signs) in cells.iter_mut().zip(signs.chunks_exact(side)) {
+                if signs.iter().fold(0, |a, b| a | b) < 0 {
+                    *cell = 0;
+                }
             }
         }
     }
@@ -117,6 +124,7 @@ impl Overview {
             return;
         }
         let (lattice, row) = (self.lattice, self.n_cells.x as usize);
+        let is_all_visible = |distances: &[i8]| occupancy.is_some_and(|o| is_all_visible(o.side(), distances));
         let slab = row * (self.n_cells.y * n_cells) as usize;
         self.distances.par_chunks_mut(slab).enumerate().for_each(|(z, cells)| {
             for (x, y) in (0..dims.y).flat_map(|y| (0..dims.x).map(move |x| (x, y))) {
@@ -124,6 +132,7 @@ impl Overview {
                     IndexEntry::Resident { slot, reach: Reach(0) } => {
                         let corner = (x * n_cells) as usize + row * (y * n_cells) as usize;
                         let seen = occupancy.map(|occupancy| occupancy.brick(slot));
+                        let seen = seen.filter(|distances| !is_all_visible(distances));
                         lattice.mark_fine(&mut cells[corner..], [row, row * self.n_cells.y as usize], seen);
                     }
                     _ => continue,
