@@ -18,8 +18,8 @@ use crate::report::{
     BackendInfo, LeftOut, Machine, REPORT_FORMAT, ReferenceInfo, Report, Row, SceneInfo, commit, mark_front, page,
 };
 
-pub(crate) use options::each_once;
 pub use options::{CompareArgs, parse};
+pub(crate) use options::{each_once, typed};
 pub use output::{OutputError, say};
 pub use rivals::RivalArgs;
 
