@@ -16,16 +16,20 @@ class Peer:
             raise ValueError(f"{scene.path}: vtkNrrdReader found {image.GetDimensions()} voxels, not {scene.dims}")
         image.SetOrigin(0, 0, 0)
         image.SetSpacing(*scene.spacing)
+        with phases.phase("device"):
+            self.window, view = window(scene)
         with phases.phase("scene"):
             fixed = contestant == "vtk-fixed"
             self.mapper = fixed_mapper() if fixed else gpu_mapper()
             self.mapper.SetInputData(image)
-            self.window, self.camera = window(scene, self.mapper)
+            view.AddViewProp(volume(scene, self.mapper))
+            self.camera = view.GetActiveCamera()
+            self.camera.SetViewAngle(scene.fov_degrees)
         version = vtk.vtkVersion.GetVTKVersion()
-        threads = f"{self.mapper.GetNumberOfThreads()} threads" if fixed else renderer(self.window)
+        device = f"{self.mapper.GetNumberOfThreads()} threads" if fixed else renderer(self.window)
         # Both end the volume at the outer sample centres. The pixels of the fixed-point mapper's picture lie on a grid of size - 1.
         view = (scene.size - 1) / scene.size if fixed else 1.0
-        self.info = {"version": f"VTK {version}", "device": threads, "domain": "centres", "view": view}
+        self.info = {"version": f"VTK {version}", "device": device, "domain": "centres", "view": view}
 
     def draw(self, step_voxels, camera):
         step = step_voxels * self.scene.least_spacing
@@ -69,7 +73,20 @@ def gpu_mapper():
     return mapper
 
 
-def window(scene, mapper):
+def window(scene):
+    """A window that is not shown, with its context."""
+    view = vtk.vtkRenderer()
+    view.SetBackground(0, 0, 0)
+    made = vtk.vtkRenderWindow()
+    made.SetOffScreenRendering(1)
+    made.SetMultiSamples(0)
+    made.SetSize(scene.size, scene.size)
+    made.AddRenderer(view)
+    made.Render()
+    return made, view
+
+
+def volume(scene, mapper):
     unit = scene.least_spacing
     opacity = vtk.vtkPiecewiseFunction()
     for value, alpha in zip(*scene.opacity_points(unit)):
@@ -82,24 +99,13 @@ def window(scene, mapper):
     look.SetScalarOpacity(opacity)
     look.SetScalarOpacityUnitDistance(unit)
     look.SetInterpolationTypeToLinear()
-    volume = vtk.vtkVolume()
-    volume.SetMapper(mapper)
-    volume.SetProperty(look)
-    view = vtk.vtkRenderer()
-    view.SetBackground(0, 0, 0)
-    view.AddViewProp(volume)
-    made = vtk.vtkRenderWindow()
-    made.SetOffScreenRendering(1)
-    made.SetMultiSamples(0)
-    made.SetSize(scene.size, scene.size)
-    made.AddRenderer(view)
-    camera = view.GetActiveCamera()
-    camera.SetViewAngle(scene.fov_degrees)
-    return made, camera
+    made = vtk.vtkVolume()
+    made.SetMapper(mapper)
+    made.SetProperty(look)
+    return made
 
 
 def renderer(window):
-    window.Render()
     lines = window.ReportCapabilities().splitlines()
     named = [line.split(":", 1)[1].strip() for line in lines if line.startswith("OpenGL renderer string")]
     return named[0] if named else window.GetClassName()

@@ -15,22 +15,25 @@
 //! Pictures are compared as they are seen over black, in three colour channels: not every peer hands out alpha. Each is held
 //! to the answer of its own [`Domain`]: VTK ends a volume at the outer sample centres, all others at the outer voxels' faces.
 //! A peer that cannot be had is listed with its reason.
+//!
+//! `--first` measures something else: from a file to the first picture, by a new process each time.
 
+mod first;
+mod lineup;
 mod measure;
+mod page;
 mod process;
 mod protocol;
 mod python;
 mod scenes;
 mod serve;
+mod standing;
 mod table;
 
 use std::ffi::OsString;
-use std::fmt;
 use std::io;
 use std::path::PathBuf;
-use std::str::FromStr;
 
-use brickfield::BackendKind;
 use brickfield::frame::Mode;
 use brickfield::options::{InputOptions, TreeOptions, ViewOptions, values};
 use clap::{CommandFactory, FromArgMatches, Parser};
@@ -40,11 +43,14 @@ use crate::compare::{CompareError, RivalArgs, each_once};
 use crate::frames::degrees;
 use crate::report::{Machine, commit};
 
+pub use first::{FirstPicture, FirstReport};
+pub use lineup::Peer;
 pub use measure::{ContestantInfo, Measured, SceneReport, StepReport};
 pub use protocol::{Domain, Part};
 pub use scenes::Generated;
+pub use standing::{Reached, TimeRatio, TimeToError};
 
-use measure::Lineup;
+use lineup::Lineup;
 use python::Python;
 
 /// Renders scenes with Brickfield and with other renderers, and reports time and error
@@ -58,6 +64,7 @@ use python::Python;
     after_help = "Examples:
   peers --install                                  once: makes target/peers with the peers in it
   peers --scene blobs --steps 1/2
+  peers --first                                    from a file to the first picture, 256^3 and 512^3
   peers --other ../before/target/debug/peers       this build, another one and the peers in one run
   peers engine.vti --transfer ct-bone --peers vtk-gpu,pygfx"
 )]
@@ -66,14 +73,21 @@ pub struct PeersArgs {
     #[arg(conflicts_with_all = ["scene", "voxels"])]
     pub file: Option<PathBuf>,
     /// Generated scenes: blobs, ml, sharp
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "blobs,ml,sharp")]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "blobs,ml,sharp",
+        default_value_if("first", "true", "blobs")
+    )]
     pub scene: Vec<Generated>,
     /// Voxels along the sides of the generated volumes
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "256",
-          value_parser = clap::value_parser!(u32).range(8..=1024))]
+          default_value_if("first", "true", "256,512"), value_parser = clap::value_parser!(u32).range(8..=1024))]
     pub voxels: Vec<u32>,
     /// Distances between samples, in units of the least voxel spacing, as decimals or fractions
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::step, default_value = "1/4,1/2,1,2")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::step, default_value = "1/4,1/2,1,2",
+          default_value_if("first", "true", "1/2"))]
     pub steps: Vec<f64>,
     /// Modes of Brickfield
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::mode, default_value = "fast,exact")]
@@ -86,12 +100,15 @@ pub struct PeersArgs {
     #[arg(long, value_name = "PROGRAM")]
     pub other: Option<PathBuf>,
     /// Timed frames of each contestant, after the one whose picture is kept and one that warms up; fewer than 6 give no
-    /// interval of 95 %
-    #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    /// interval of 95 %. With --first, its timed processes
+    #[arg(long, default_value_t = 7, default_value_if("first", "true", "3"), value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub frames: u32,
     /// Degrees that the camera turns around the volume's centre from frame to frame
     #[arg(long, value_name = "DEGREES", default_value_t = 0.5, value_parser = degrees, allow_hyphen_values = true)]
     pub turn: f64,
+    /// Measure the way from a file to the first picture instead, by a new process each time
+    #[arg(long)]
+    pub first: bool,
     /// Folder that receives peers.json, and for each scene a page with its pictures
     #[arg(long, value_name = "DIR", default_value = "target/compare-peers")]
     pub out: PathBuf,
@@ -121,32 +138,8 @@ pub struct PeersArgs {
     pub command: String,
 }
 
-/// Another renderer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs)]
-pub enum Peer {
-    VtkFixed,
-    VtkGpu,
-    Pygfx,
-    Vispy,
-}
-
 /// A peer, or the word that wants none.
 pub type WantedPeer = Option<Peer>;
-
-/// Which build a contestant is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Build {
-    This,
-    Other,
-}
-
-/// A contestant by name.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Who {
-    Own { build: Build, backend: BackendKind, mode: Mode },
-    Peer(Peer),
-}
 
 /// A run.
 #[derive(Clone, Debug, Serialize)]
@@ -160,6 +153,7 @@ pub struct PeersReport {
     pub turn_degrees: f64,
     pub brick: u32,
     pub scenes: Vec<SceneReport>,
+    pub first: Vec<FirstReport>,
 }
 
 /// Why there is no measurement.
@@ -206,48 +200,8 @@ impl PeersError {
     }
 }
 
-impl Peer {
-    const ALL: [Peer; 4] = [Peer::VtkFixed, Peer::VtkGpu, Peer::Pygfx, Peer::Vispy];
-
-    /// The name on the command line and in reports.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Peer::VtkFixed => "vtk-fixed",
-            Peer::VtkGpu => "vtk-gpu",
-            Peer::Pygfx => "pygfx",
-            Peer::Vispy => "vispy",
-        }
-    }
-}
-
-impl FromStr for Peer {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Peer, String> {
-        let names = || Peer::ALL.map(Peer::name).join(", ");
-        Peer::ALL.into_iter().find(|p| p.name() == text).ok_or_else(|| format!("{}, or none", names()))
-    }
-}
-
 fn wanted_peer(text: &str) -> Result<WantedPeer, String> {
     if text == "none" { Ok(None) } else { text.parse().map(Some) }
-}
-
-impl Who {
-    /// The name that its process knows.
-    fn served_name(self) -> String {
-        match self {
-            Who::Own { backend, mode, .. } => format!("{backend} {}", mode.name()),
-            Who::Peer(peer) => peer.name().to_owned(),
-        }
-    }
-}
-
-impl fmt::Display for Who {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let other = if matches!(self, Who::Own { build: Build::Other, .. }) { "other " } else { "" };
-        write!(f, "{other}{}", self.served_name())
-    }
 }
 
 /// The options of a command line; the first argument is the command's name.
@@ -293,9 +247,14 @@ pub fn peers(args: &PeersArgs, say: &mut dyn FnMut(&str)) -> Result<Option<Peers
         turn_degrees: args.turn,
         brick: args.tree.brick.n_samples(),
         scenes: Vec::new(),
+        first: Vec::new(),
     };
     for subject in subjects(args) {
-        report.scenes.push(measure::scene(args, &lineup, subject?, say)?);
+        if args.first {
+            report.first.push(first::first(args, &lineup, subject?, say)?);
+        } else {
+            report.scenes.push(measure::scene(args, &lineup, subject?, say)?);
+        }
         let (path, text) = (args.out.join("peers.json"), serde_json::to_string_pretty(&report));
         let text = text.expect("a report is plain data") + "\n";
         std::fs::write(&path, text).map_err(|source| PeersError::Out { path, source })?;
@@ -328,6 +287,53 @@ fn subjects(args: &PeersArgs) -> Box<dyn Iterator<Item = Result<scenes::Subject,
                 args.scene.iter().map(move |scene| Ok(scene.subject(n)))
             };
             Box::new(args.voxels.iter().flat_map(of))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn args(words: &str) -> Result<PeersArgs, clap::Error> {
+        parse(std::iter::once("peers").chain(words.split_whitespace()).map(OsString::from).collect())
+    }
+
+    #[test]
+    fn peers_measure_three_scenes_or_first_pictures_of_two_sizes() {
+        let a = args("").unwrap();
+        assert_eq!(
+            (a.scene.len(), a.voxels.as_slice(), a.steps.as_slice()),
+            (3, &[256][..], &[0.25, 0.5, 1.0, 2.0][..])
+        );
+        assert_eq!((a.peers.len(), a.modes.len(), a.frames, a.view.size.x), (4, 2, 7, 512));
+        let a = args("--first").unwrap();
+        assert_eq!((a.scene.as_slice(), a.voxels.as_slice()), (&[Generated::Blobs][..], &[256, 512][..]));
+        assert_eq!((a.steps.as_slice(), a.frames), (&[0.5][..], 3));
+        assert_eq!(args("--peers none --steps 1,1").unwrap().peers, [None]);
+        assert_eq!(args("x.vti --transfer ct-bone --peers pygfx").unwrap().peers, [Some(Peer::Pygfx)]);
+    }
+
+    #[test]
+    fn peers_refuse_what_they_cannot_draw() {
+        let bad = [
+            "--scene spheres",
+            "--voxels 4",
+            "--steps 0",
+            "--peers paraview",
+            "--frames 0",
+            "--transfer ct-bone",
+            "--camera front",
+            "x.vti --scene ml",
+            "x.vti --voxels 64",
+            "--turn 400",
+        ];
+        for bad in bad {
+            assert_eq!(args(bad).unwrap_err().exit_code(), 2, "{bad}");
+        }
+        for (bad, text) in [("--size 8x9", "square"), ("--clip 0:1,0:1,0:1", "--clip"), ("--lod 1", "--lod")] {
+            let e = peers(&args(bad).unwrap(), &mut |_| ()).unwrap_err();
+            assert!(e.status() == 2 && e.to_string().contains(text), "{e}");
         }
     }
 }

@@ -5,8 +5,9 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use std::process::Command;
 
+use super::PeersError;
+use super::lineup::Who;
 use super::protocol::{Answer, Ask, Drawing, Drawn, Opened, Opening};
-use super::{PeersError, Who};
 use crate::turns::LineProcess;
 
 /// A contestant that is ready.
