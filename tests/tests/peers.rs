@@ -52,7 +52,7 @@ fn peers_take_part_are_absent_or_fail() {
     let folder = tempfile::tempdir().unwrap();
     let other = env!("CARGO_BIN_EXE_peers");
     let output =
-        run(folder.path(), &format!("--scene blobs --steps 1/2,2 --peers vtk-gpu,pygfx,vispy --other {other}"));
+        run(folder.path(), &format!("--scene blobs --steps 1/2,1/4 --peers vtk-gpu,pygfx,vispy --other {other}"));
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
     let report: Value = serde_json::from_slice(&fs::read(folder.path().join("out/peers.json")).unwrap()).unwrap();
@@ -70,13 +70,16 @@ fn peers_take_part_are_absent_or_fail() {
         let names: Vec<&str> = rows.iter().map(|r| r["contestant"].as_str().unwrap()).collect();
         assert_eq!(names, ["cpu fast", "other cpu fast", "cpu exact", "other cpu exact", "vtk-gpu"]);
         assert_eq!((&row("vtk-gpu")["cpu"]["median"], &row("vtk-gpu")["wall_ms"][0]), (&8.0.into(), &4.0.into()));
-        // A black picture is far off; exact mode is not, and another process of the same build draws the same.
+        // A black picture is far off, and another process of the same build draws the same.
         assert!(row("vtk-gpu")["rmse"].as_f64().unwrap() > 0.05);
-        assert!(row("cpu exact")["rmse"].as_f64().unwrap() < 3e-3);
         assert_eq!(row("cpu fast")["rmse"], row("other cpu fast")["rmse"]);
         assert!(row("cpu fast")["cpu"]["median"].as_f64().unwrap() > 0.0);
         assert_eq!(step["ratios"].as_array().unwrap().len(), 4);
     }
+    // The midpoint rule has order 2: held to a wrong answer, or to that of another box, errors would not fall so.
+    let error = |step: usize| scene["steps"][step]["rows"][2]["rmse"].as_f64().unwrap();
+    let ratio = error(0) / error(1);
+    assert!((3.0..5.0).contains(&ratio), "half the step has 1/{ratio} of the error");
     assert_eq!(scene["times_to_errors"].as_array().unwrap().len(), 2 * 5);
     let page = fs::read_to_string(folder.path().join("out/blobs-24/index.html")).unwrap();
     assert!(page.contains("data-rule=\"other-build\"") && page.contains("<b>pygfx</b> is absent: no module"));

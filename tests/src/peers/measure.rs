@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use brickfield::BackendKind;
 use brickfield::core::glam::{DVec3, UVec2};
@@ -127,7 +128,8 @@ pub(super) fn scene(
     };
     say(&table::heading(&report));
     let mut answers = Answers { subject, size: args.view.size, known: HashMap::new() };
-    let mut page = Page::new(args, subject, answers.of(Domain::Voxels, 1.0))?;
+    let (begin, answer) = (Instant::now(), answers.of(Domain::Voxels, 1.0));
+    let mut page = Page::new(args, subject, answer, begin.elapsed().as_secs_f64())?;
     for step in &args.steps {
         let frames = frames(args, &exhibit, &mut present, *step, &mut report.contestants)?;
         let mut rows = Vec::new();

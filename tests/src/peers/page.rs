@@ -36,14 +36,20 @@ const ANSWER: &str = "the continuous integral in f64 of whole voxels, over black
                       the outer sample centres, and those of its fixed-point mapper to that one on the mapper's own grid of pixels";
 
 impl<'a> Page<'a> {
-    pub(super) fn new(args: &'a PeersArgs, subject: &'a Subject, answer: &Image<f64>) -> Result<Page<'a>, PeersError> {
+    /// The answer took some seconds.
+    pub(super) fn new(
+        args: &'a PeersArgs,
+        subject: &'a Subject,
+        answer: &Image<f64>,
+        seconds: f64,
+    ) -> Result<Page<'a>, PeersError> {
         let output = OutputFolder::new(&args.out.join(&subject.name))?;
         let files = output.picture("reference", &answer.map(|v| v as f32), BACKGROUND, &[])?;
         let begin = Instant::now();
         let reference = ReferenceInfo {
             what: ANSWER.to_owned(),
             tolerance: ACCURACY.tolerance,
-            seconds: 0.0,
+            seconds,
             png: files.png,
             exr: files.exr,
         };
