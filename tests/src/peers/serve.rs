@@ -13,7 +13,7 @@ use super::protocol::{Answer, Ask, Domain, Drawing, Drawn, Opened, Opening, Part
 use crate::compare::rivals::Rivals;
 use crate::frames::Phase;
 use crate::memory::cpu_seconds;
-use crate::report::commit;
+use crate::report::{Machine, commit};
 use crate::turns::tree_frame;
 
 /// A backend that has read a volume.
@@ -79,7 +79,7 @@ impl Drawer {
         let backend = rivals.present.pop().ok_or_else(|| rivals.infos[0].absent.clone().unwrap_or_default())?;
         let description = backend.describe();
         let opened = Opened {
-            version: commit(),
+            version: format!("{}, {} build", commit(), Machine::here().build),
             device: format!("{}, {}", description.adapter, description.driver),
             domain: Domain::Voxels,
             view: 1.0,

@@ -14,7 +14,18 @@ use crate::turns::Spread;
 /// The scene, who takes part, and who does not.
 pub(super) fn heading(scene: &SceneReport) -> String {
     let [x, y, z] = scene.dims;
-    format!("\n{}: {x} x {y} x {z} {}\n{}\n", scene.name, scene.scalar, who(&scene.contestants))
+    let (who, notes) = (who(&scene.contestants), checked(&scene.contestants));
+    format!("\n{}: {x} x {y} x {z} {}\n{who}\n{notes}", scene.name, scene.scalar)
+}
+
+/// A line if a build has debug assertions: `cargo test` puts such a program where `cargo build` puts the optimized one.
+fn checked(contestants: &[ContestantInfo]) -> String {
+    let checked = contestants.iter().filter(|c| c.version.contains("checked build"));
+    let names: Vec<&str> = checked.map(|c| c.name.as_str()).collect();
+    if names.is_empty() {
+        return String::new();
+    }
+    format!("note: {}: of a checked build, whose times say little; build it anew, without tests\n", names.join(", "))
 }
 
 fn who(contestants: &[ContestantInfo]) -> Table {
