@@ -55,6 +55,8 @@ fn peers_take_part_are_absent_or_fail() {
         run(folder.path(), &format!("--scene blobs --steps 1/2,1/4 --peers vtk-gpu,pygfx,vispy --other {other}"));
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
+    // Who fails on the way is told, too.
+    assert!(text.lines().any(|l| l.starts_with("failed: vispy: ") && l.ends_with("out of memory")), "{text}");
     // The program has the profile of its test.
     assert_eq!(text.contains("note: cpu fast, other cpu fast"), cfg!(debug_assertions), "{text}");
     let report: Value = serde_json::from_slice(&fs::read(folder.path().join("out/peers.json")).unwrap()).unwrap();

@@ -133,9 +133,16 @@ pub(super) fn of_file(path: &Path, input: &InputOptions, view: &ViewOptions) -> 
     let Projection::Perspective { fov_y } = camera.projection() else { return Err(PeersError::Orthographic) };
     let distance = (volume.grid().world_box().center() - camera.eye()).dot(camera.forward());
     let target = camera.eye() + camera.forward() * distance;
-    let view = View { eye: camera.eye().to_array(), target: target.to_array(), up: camera.up().to_array() };
+    let view = View { eye: camera.eye().to_array(), target: target.to_array(), up: upwards(&camera).to_array() };
     let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     Ok(Subject { name, volume, transfer, view, fov_degrees: fov_y.to_degrees() })
+}
+
+/// The world's z axis where it lies upwards in the picture, else the picture's own: the same picture, and cameras that turn about
+/// z alone can take it.
+fn upwards(camera: &Camera) -> DVec3 {
+    let is_level = camera.right().z.abs() < 1e-9 && camera.up().z > 0.0;
+    if is_level { DVec3::Z } else { camera.up() }
 }
 
 impl Subject {
@@ -260,6 +267,17 @@ mod tests {
             (small.knots()[2].color, a.color, small.knots()[0].color),
             ([1.0; 3], [1.0, 0.0, 0.0], [0.5, 0.5, 1.0])
         );
+    }
+
+    #[test]
+    fn peers_look_upwards_along_z_where_the_picture_is_level() {
+        let camera =
+            |up| Camera::look_at(DVec3::new(5.0, 3.0, 2.0), DVec3::ZERO, up, Projection::Perspective { fov_y: 0.5 });
+        assert_eq!(upwards(&camera(DVec3::Z).unwrap()), DVec3::Z);
+        for up in [DVec3::X, -DVec3::Z] {
+            let camera = camera(up).unwrap();
+            assert_eq!(upwards(&camera), camera.up());
+        }
     }
 
     #[test]

@@ -86,6 +86,11 @@ pub(super) fn step(scene: &SceneReport, step: &StepReport) -> String {
     let n_frames = step.rows.first().map_or(0, |r| r.wall_ms.len());
     let label = step_label(step.step_voxels);
     let mut text = format!("{}, step {label}: ms a frame, medians of {n_frames}\n{lines}\n", scene.name);
+    for c in scene.contestants.iter().filter(|c| c.domain.is_some()) {
+        if let Some(reason) = &c.absent {
+            let _ = writeln!(text, "failed: {}: {reason}", c.name);
+        }
+    }
     if !step.ratios.is_empty() {
         let mut lines = Table::new();
         lines.load_preset(NOTHING).set_header(["CPU time as a ratio", "", "wall time"]);
