@@ -2,7 +2,7 @@
 //!
 //! Unpublished. `compare` (binary) renders a scene on every backend and reports error against run time; `conformance` holds
 //! every backend to the f64 answer, and its own cases to mutants; `orders` prints observed orders of accuracy; `speed` times; `frames`
-//! times steady frames of a file; `gpu` measures a graphics card, alone. Whatever is timed is timed by [`turns`].
+//! times steady frames of a file; `peers` holds Brickfield next to other renderers; `gpu` measures a graphics card, alone. Whatever is timed is timed by [`turns`].
 
 pub mod codecs;
 pub mod compare;
@@ -16,6 +16,7 @@ mod memory;
 pub mod metrics;
 pub mod orders;
 pub mod paper;
+pub mod peers;
 pub mod report;
 pub mod saladi;
 pub mod tong;

@@ -59,6 +59,23 @@ pub fn errors(image: &Image<f32>, reference: &Image<f64>) -> Result<Errors, Metr
     })
 }
 
+/// How far `image` is from `reference` in the three colour channels; both are [`opaque`].
+///
+/// # Errors
+/// As [`errors`].
+pub fn color_errors(image: &Image<f32>, reference: &Image<f64>) -> Result<Errors, MetricError> {
+    let e = errors(image, reference)?;
+    // The fourth channel is equal.
+    Ok(Errors { rmse: e.rmse * (4.0f64 / 3.0).sqrt(), ..e })
+}
+
+/// A picture over black.
+pub fn opaque<T: Copy + Default + From<f32>>(image: &Image<T>) -> Image<T> {
+    let mut over_black = image.clone();
+    over_black.pixels_mut().iter_mut().for_each(|pixel| pixel[3] = 1.0f32.into());
+    over_black
+}
+
 /// The share of pixels, 0 to 1, that differ by at most `bound` in every channel.
 ///
 /// # Errors
@@ -183,6 +200,17 @@ mod tests {
             assert!((e.worst.difference - 0.25).abs() < 1e-7);
             assert_eq!((e.worst.pixel, e.worst.channel), (UVec2::new(7, 31), channel));
             assert!((e.rmse - 0.25 / 8000f64.sqrt()).abs() < 1e-7);
+        }
+    }
+
+    #[test]
+    fn over_black_three_channels_count_and_alpha_does_not() {
+        let at = UVec2::new(7, 31);
+        let of = |image| color_errors(&opaque(&image), &opaque(&reference())).unwrap();
+        assert!(of(changed(at, 3, 0.25)).worst.difference < 1e-7);
+        for channel in 0..3 {
+            let e = of(changed(at, channel, 0.25));
+            assert!((e.rmse - 0.25 / 6000f64.sqrt()).abs() < 1e-7 && (e.worst.difference - 0.25).abs() < 1e-7);
         }
     }
 

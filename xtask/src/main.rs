@@ -19,8 +19,8 @@ use spawn::{Spawn, Tool, cargo};
 /// The project's commands
 ///
 /// Start with `cargo xtask setup` on a new machine, then `cargo xtask compare`. Exit codes: 0 good, 1 something failed or
-/// is missing, 2 bad arguments; compare, conformance, frames, gpu, orders, sheet, speed, test and bench pass on what the program that they run says.
-/// `cargo xtask compare --help` shows what can be chosen; so do those of conformance, frames, gpu, orders, sheet and speed. They are built first.
+/// is missing, 2 bad arguments; compare, conformance, frames, gpu, orders, peers, sheet, speed, test and bench pass on what the program that they run says.
+/// `cargo xtask compare --help` shows what can be chosen; so do those of conformance, frames, gpu, orders, peers, sheet and speed. They are built first.
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", after_help = ENVIRONMENT)]
 struct Arguments {
@@ -65,6 +65,9 @@ enum Command {
     /// Measure the order of accuracy of every quadrature rule
     #[command(disable_help_flag = true)]
     Orders(Passed),
+    /// Render the same scenes with VTK, pygfx and vispy, and compare time and error; `--install` brings them
+    #[command(disable_help_flag = true)]
+    Peers(Passed),
     /// Measure what skipping saves, the CPU path against the GPU paths, an empty frame, the octree's build rate
     #[command(disable_help_flag = true)]
     Speed(Passed),
@@ -109,6 +112,7 @@ fn main() -> Result<ExitCode> {
         Command::Gpu(passed) => Tool::Gpu.run(&passed.typed()),
         Command::Frames(passed) => Tool::Frames.run(&passed.typed()),
         Command::Orders(passed) => Tool::Orders.run(&passed.typed()),
+        Command::Peers(passed) => Tool::Peers.run(&passed.typed()),
         Command::Speed(passed) => Tool::Speed.run(&passed.typed()),
         Command::Sheet(passed) => Tool::Sheet.run(&passed.typed()),
         Command::Bench(passed) => of_packages(cargo("bench").arg("--benches"), &passed.typed()),

@@ -18,6 +18,7 @@ pub(crate) enum Tool {
     Frames,
     Gpu,
     Orders,
+    Peers,
     Sheet,
     Speed,
 }
@@ -91,6 +92,7 @@ impl Tool {
             Tool::Conformance => "conformance",
             Tool::Gpu => "gpu",
             Tool::Orders => "orders",
+            Tool::Peers => "peers",
             Tool::Sheet => "sheet",
             Tool::Speed => "speed",
         }

@@ -7,7 +7,7 @@ use brickfield::options::progress_bar;
 use indicatif::ProgressBar;
 
 use super::CompareError;
-use super::output::{JudgedPicture, OutputError, Pictures};
+use super::output::{Caption, JudgedPicture, OutputError, Pictures};
 use super::rivals::Rivals;
 use super::sweep::{Priority, REACHED, SweepPoint};
 use crate::metrics::median;
@@ -110,7 +110,15 @@ impl Contest<'_> {
             Err(e) => return Ok(Err(e.to_string())),
         };
         let whole = begin.elapsed();
-        let shown = self.pictures.judge(c, backend.describe(), &image)?;
+        let d = backend.describe();
+        let caption = Caption {
+            backend: d.backend,
+            adapter: format!("{} ({})", d.adapter, d.driver),
+            mode: c.mode.name(),
+            rule: c.rule.name(),
+            step_voxels: c.step_voxels,
+        };
+        let shown = self.pictures.judge(&caption, &image)?;
         Ok(shown.map(|shown| BackendAtPoint { point, rival, shown, warm_up: timing, timed: Vec::new(), whole }))
     }
 

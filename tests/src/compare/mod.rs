@@ -2,9 +2,9 @@
 
 mod contest;
 mod options;
-mod output;
+pub(crate) mod output;
 pub(crate) mod rivals;
-mod subject;
+pub(crate) mod subject;
 mod sweep;
 
 use std::time::{Duration, Instant};
@@ -15,11 +15,12 @@ use brickfield::cpu::{ContinuousOptions, continuous};
 use indicatif::ProgressBar;
 
 use crate::report::{
-    BackendInfo, LeftOut, Machine, REPORT_FORMAT, ReferenceInfo, Report, Row, SceneInfo, commit, mark_front, page,
+    BackendInfo, Channels, LeftOut, Machine, REPORT_FORMAT, ReferenceInfo, Report, Row, SceneInfo, commit, mark_front,
+    page,
 };
 
-pub(crate) use options::each_once;
 pub use options::{CompareArgs, parse};
+pub(crate) use options::{each_once, typed};
 pub use output::{OutputError, say};
 pub use rivals::RivalArgs;
 
@@ -69,7 +70,8 @@ pub fn compare(args: &CompareArgs) -> Result<Report, CompareError> {
     let exhibit = subject::exhibit(args)?;
     let points = sweep::sweep_points(args, &exhibit)?;
     let (answer, reference) = answer(args, &exhibit, &output)?;
-    let pictures = Pictures { output: &output, answer: &answer, background: args.view.background.0 };
+    let background = args.view.background.0;
+    let pictures = Pictures { output: &output, answer: &answer, background, channels: Channels::All };
     let limits = MeasureLimits { end: begin + time_allowed(args), n_frames: args.frames };
     let (rows, left_out) = Contest { points: &points, rivals: &mut rivals, pictures: &pictures, limits }.run()?;
     if let (true, Some(first)) = (rows.is_empty(), left_out.first()) {
@@ -139,6 +141,7 @@ fn report(args: &CompareArgs, exhibit: &Exhibit, found: CompareResult) -> Report
         driver: drivers(&found.backends),
         backends: found.backends,
         reference: found.reference,
+        channels: Channels::All,
         rows,
         left_out: found.left_out,
         total_seconds: found.seconds,
@@ -146,7 +149,7 @@ fn report(args: &CompareArgs, exhibit: &Exhibit, found: CompareResult) -> Report
 }
 
 /// The Vulkan drivers that took part, each once.
-fn drivers(backends: &[BackendInfo]) -> String {
+pub(crate) fn drivers(backends: &[BackendInfo]) -> String {
     let mut drivers: Vec<&str> =
         backends.iter().filter(|b| b.backend != "cpu").filter_map(|b| b.driver.as_deref()).collect();
     drivers.dedup();

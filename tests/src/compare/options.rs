@@ -82,8 +82,7 @@ pub struct CompareArgs {
 /// # Errors
 /// clap's message, to be printed by its `exit`.
 pub fn parse(arguments: Vec<OsString>) -> Result<CompareArgs, clap::Error> {
-    let words = arguments.iter().skip(1).map(|a| quoted(&a.to_string_lossy()));
-    let command = std::iter::once("cargo xtask compare".to_owned()).chain(words).collect::<Vec<_>>().join(" ");
+    let command = typed("cargo xtask compare", &arguments);
     // Small enough that fine steps end in time; all rows of a report share one size.
     let size = |a: clap::Arg| {
         let a = a.help("Size of the picture in pixels; of a file 256x256 unless stated");
@@ -100,6 +99,12 @@ pub fn parse(arguments: Vec<OsString>) -> Result<CompareArgs, clap::Error> {
 pub(crate) fn each_once<T: Copy + PartialEq>(list: &[T]) -> Vec<T> {
     let is_first = |(i, x): &(usize, &T)| !list[..*i].contains(x);
     list.iter().enumerate().filter(is_first).map(|(_, x)| *x).collect()
+}
+
+/// A command line as a shell takes it; its first word is replaced.
+pub(crate) fn typed(command: &str, arguments: &[OsString]) -> String {
+    let words = arguments.iter().skip(1).map(|a| quoted(&a.to_string_lossy()));
+    std::iter::once(command.to_owned()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
 fn quoted(word: &str) -> String {

@@ -4,13 +4,11 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use brickfield::core::{Image, LinearRgb};
-use brickfield::frame::Description;
 use brickfield::optics::ColorDifferences;
 use brickfield::{PictureError, write_exr, write_png};
 
-use super::sweep::SweepPoint;
-use crate::metrics::{Errors, delta_e, errors};
-use crate::report::{Report, heat};
+use crate::metrics::{Errors, MetricError, color_errors, delta_e, errors, opaque};
+use crate::report::{Channels, Report, heat};
 
 /// Why the results could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -30,20 +28,20 @@ pub enum OutputError {
 }
 
 /// A hidden folder in the output folder, which takes everything until it is complete.
-pub(super) struct OutputFolder {
+pub(crate) struct OutputFolder {
     out: PathBuf,
     draft: tempfile::TempDir,
 }
 
 /// A picture's files, relative to the report.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Files {
-    pub(super) exr: String,
-    pub(super) png: String,
+pub(crate) struct Files {
+    pub(crate) exr: String,
+    pub(crate) png: String,
 }
 
 impl OutputFolder {
-    pub(super) fn new(out: &Path) -> Result<OutputFolder, OutputError> {
+    pub(crate) fn new(out: &Path) -> Result<OutputFolder, OutputError> {
         let io = |source| OutputError::Io { path: out.to_owned(), source };
         std::fs::create_dir_all(out).map_err(io)?;
         if out.join("images").exists() && !out.join("report.json").exists() {
@@ -58,12 +56,12 @@ impl OutputFolder {
     }
 
     /// Where the files lie until they are published.
-    pub(super) fn folder(&self) -> &Path {
+    pub(crate) fn folder(&self) -> &Path {
         self.draft.path()
     }
 
     /// Writes a picture for measuring and for looking.
-    pub(super) fn picture(
+    pub(crate) fn picture(
         &self,
         name: &str,
         image: &Image<f32>,
@@ -77,7 +75,7 @@ impl OutputFolder {
     }
 
     /// Moves everything to its place, replacing an earlier comparison's; `report.json` comes last.
-    pub(super) fn publish(self, report: &Report, html: &str) -> Result<(), OutputError> {
+    pub(crate) fn publish(self, report: &Report, html: &str) -> Result<(), OutputError> {
         let io = |source| OutputError::Io { path: self.out.clone(), source };
         let json = serde_json::to_string_pretty(report).map_err(|e| io(e.into()))?;
         std::fs::write(self.folder().join("index.html"), html).map_err(io)?;
@@ -94,43 +92,68 @@ impl OutputFolder {
 }
 
 /// Judges pictures by the answer, and writes them.
-pub(super) struct Pictures<'a> {
-    pub(super) output: &'a OutputFolder,
-    pub(super) answer: &'a Image<f64>,
-    pub(super) background: LinearRgb,
+pub(crate) struct Pictures<'a> {
+    pub(crate) output: &'a OutputFolder,
+    pub(crate) answer: &'a Image<f64>,
+    pub(crate) background: LinearRgb,
+    pub(crate) channels: Channels,
+}
+
+/// Who made a picture, and how.
+pub(crate) struct Caption<'a> {
+    pub(crate) backend: &'a str,
+    /// With its driver.
+    pub(crate) adapter: String,
+    pub(crate) mode: &'a str,
+    pub(crate) rule: &'a str,
+    pub(crate) step_voxels: f64,
 }
 
 /// A picture that has been judged and written.
-pub(super) struct JudgedPicture {
-    pub(super) errors: Errors,
-    pub(super) delta_e: ColorDifferences,
-    pub(super) files: Files,
-    pub(super) difference: Files,
+pub(crate) struct JudgedPicture {
+    pub(crate) errors: Errors,
+    pub(crate) delta_e: ColorDifferences,
+    pub(crate) files: Files,
+    pub(crate) difference: Files,
 }
 
 impl Pictures<'_> {
     /// The inner error says why the picture has no errors (it is not finite, say).
-    pub(super) fn judge(
+    pub(crate) fn judge(
         &self,
-        case: &SweepPoint,
-        by: &Description,
+        by: &Caption<'_>,
         image: &Image<f32>,
     ) -> Result<Result<JudgedPicture, String>, OutputError> {
-        let judged = errors(image, self.answer).and_then(|e| Ok((e, delta_e(image, self.answer, self.background)?)));
+        let over_black;
+        let image = match self.channels {
+            Channels::All => image,
+            Channels::Colors => {
+                over_black = opaque(image);
+                &over_black
+            }
+        };
+        let judged = self.errors(image).and_then(|e| Ok((e, delta_e(image, self.answer, self.background)?)));
         let (errors, delta_e) = match judged {
             Ok(judged) => judged,
             Err(e) => return Ok(Err(e.to_string())),
         };
-        let (mode, rule, step) = (case.mode.name(), case.rule.name(), case.step_voxels);
-        let name = format!("{}-{mode}-{rule}-{step}", by.backend);
+        let Caption { backend, adapter, mode, rule, step_voxels } = by;
+        let name = format!("{backend}-{mode}-{rule}-{step_voxels}");
         let attributes = [
-            ("backend", by.backend.to_owned()),
-            ("adapter", format!("{} ({})", by.adapter, by.driver)),
-            ("sampling", format!("{mode} {rule} step {step} voxels")),
+            ("backend", (*backend).to_owned()),
+            ("adapter", adapter.clone()),
+            ("sampling", format!("{mode} {rule} step {step_voxels} voxels")),
         ];
         let files = self.output.picture(&name, image, self.background, &attributes)?;
         let difference = self.difference(&format!("{name}-difference"), image, &attributes)?;
         Ok(Ok(JudgedPicture { errors, delta_e, files, difference }))
+    }
+
+    fn errors(&self, image: &Image<f32>) -> Result<Errors, MetricError> {
+        match self.channels {
+            Channels::All => errors(image, self.answer),
+            Channels::Colors => color_errors(image, self.answer),
+        }
     }
 
     fn difference(&self, name: &str, image: &Image<f32>, attributes: &[(&str, String)]) -> Result<Files, OutputError> {

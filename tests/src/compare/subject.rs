@@ -48,7 +48,7 @@ pub(super) fn clip_in_sample_space(exhibit: &Exhibit) -> Aabb {
     }
 }
 
-pub(super) fn projection_text(camera: &Camera) -> String {
+pub(crate) fn projection_text(camera: &Camera) -> String {
     match camera.projection() {
         Projection::Perspective { fov_y } => format!("perspective {:.3} degrees", fov_y.to_degrees()),
         Projection::Orthographic { height } => format!("orthographic {height} units"),

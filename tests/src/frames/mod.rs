@@ -147,7 +147,7 @@ pub fn frames(args: &FramesArgs) -> Result<FramesReport, FramesError> {
     let middle = subject.volume.grid().world_box().center();
     take_turns(contestants.len(), WARM_UP + args.frames, |turn| {
         let contestant = &mut contestants[turn.contestant];
-        let camera = turned(&scene.camera, middle, args.turn * f64::from(turn.round));
+        let camera = turned(&scene.camera, middle, scene.camera.up(), args.turn * f64::from(turn.round));
         let backend = present[contestant.backend].as_mut();
         contestant.frame(&subject, camera, backend, &mut residencies[contestant.backend], turn.round)
     })?;
@@ -245,15 +245,16 @@ impl Contestant {
     }
 }
 
-/// A camera that has gone around a point, about its own axis upwards.
-fn turned(camera: &Camera, around: DVec3, degrees: f64) -> Camera {
-    let turn = DQuat::from_axis_angle(camera.up(), degrees.to_radians());
+/// A camera that has gone around a point, about an axis of unit length.
+pub(crate) fn turned(camera: &Camera, around: DVec3, axis: DVec3, degrees: f64) -> Camera {
+    let turn = DQuat::from_axis_angle(axis, degrees.to_radians());
     let eye = around + turn * (camera.eye() - around);
-    Camera::look_at(eye, eye + turn * camera.forward(), camera.up(), camera.projection())
-        .expect("a camera that has been turned about its own axis is one")
+    Camera::look_at(eye, eye + turn * camera.forward(), turn * camera.up(), camera.projection())
+        .expect("a camera that has been turned is one")
 }
 
-fn degrees(text: &str) -> Result<f64, String> {
+/// Degrees from -360 to 360, as the command line states them.
+pub(crate) fn degrees(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(degrees) if degrees.abs() <= 360.0 => Ok(degrees),
         _ => Err("degrees are a number from -360 to 360".to_owned()),
@@ -271,11 +272,12 @@ mod tests {
         let around = DVec3::new(1.0, 2.0, 3.0);
         let projection = Projection::Perspective { fov_y: 0.5 };
         let camera = Camera::look_at(DVec3::new(9.0, 5.0, 4.0), around, DVec3::Z, projection).unwrap();
-        let there = turned(&camera, around, 90.0);
+        let turned = |camera: &Camera, degrees| turned(camera, around, camera.up(), degrees);
+        let there = turned(&camera, 90.0);
         assert!((there.eye().distance(around) - camera.eye().distance(around)).abs() < 1e-12);
         assert!(there.forward().dot((around - there.eye()).normalize()) > 1.0 - 1e-12);
         assert!((there.up() - camera.up()).length() < 1e-12);
-        let back = turned(&turned(&camera, around, 33.0), around, -33.0);
+        let back = turned(&turned(&camera, 33.0), -33.0);
         assert!((back.eye() - camera.eye()).length() < 1e-12);
     }
 

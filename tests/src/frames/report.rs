@@ -55,7 +55,7 @@ pub struct Series {
     pub device_ms: Option<Spread>,
     pub read_back_ms: Spread,
     pub whole_ms: Spread,
-    /// Of all threads, a frame; the system counts in hundredths of a second, so that many frames say more.
+    /// Of all threads, a frame: the mean.
     pub cpu_ms: Option<f64>,
     /// The most that the process held while it drew these frames; other backends' bricks are among it.
     pub peak_bytes: Option<u64>,
@@ -80,7 +80,7 @@ pub struct FrameTimes {
 
 impl Phase {
     /// Does it.
-    pub(super) fn of<T>(work: impl FnOnce() -> T) -> (Phase, T) {
+    pub(crate) fn of<T>(work: impl FnOnce() -> T) -> (Phase, T) {
         let (begin, cpu) = (Instant::now(), cpu_seconds());
         let done = work();
         let wall_ms = begin.elapsed().as_secs_f64() * 1e3;

@@ -41,12 +41,36 @@ pub struct Report {
     pub backends: Vec<BackendInfo>,
     /// The reference that the errors are taken against.
     pub reference: ReferenceInfo,
+    /// The channels that the errors are over.
+    #[serde(default)]
+    pub channels: Channels,
     /// One row for each backend, mode, rule and step.
     pub rows: Vec<Row>,
     /// The points that were asked for and not measured, and why.
     pub left_out: Vec<LeftOut>,
     /// How long the whole comparison took.
     pub total_seconds: f64,
+}
+
+/// The channels of pictures that count.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Channels {
+    /// Colours, and alpha beside them.
+    #[default]
+    All,
+    /// Colours over black: pictures without alpha are among them.
+    Colors,
+}
+
+impl Channels {
+    /// As sentences name them.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Channels::All => "four channels",
+            Channels::Colors => "three colour channels, as they are seen over black",
+        }
+    }
 }
 
 /// What was rendered.
@@ -109,13 +133,13 @@ pub struct BackendInfo {
 /// One measurement: a backend, a mode, a rule and a step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// `cpu`, `wgpu` or `ash`.
+    /// `cpu`, `wgpu`, `ash`, or a peer's name.
     pub backend: String,
     /// The adapter's name.
     pub adapter: String,
     /// `exact` or `fast`.
     pub mode: String,
-    /// The quadrature rule's name.
+    /// The quadrature rule's name; `peer` for a peer's own.
     pub rule: String,
     /// Length of a segment, in units of the least voxel spacing.
     pub step_voxels: f64,
@@ -133,7 +157,7 @@ pub struct Row {
     pub upload_ms: f64,
     /// Number of timed frames; the first, which warms up, is not among them unless it is the only one.
     pub n_frames: u32,
-    /// Root mean square difference over all pixels and four channels.
+    /// Root mean square difference over all pixels and the report's channels.
     pub rmse: f64,
     /// Greatest difference of any channel.
     pub max_abs: f64,
@@ -314,6 +338,7 @@ pub(crate) mod tests {
                 png: "images/reference.png".to_owned(),
                 exr: "images/reference.exr".to_owned(),
             },
+            channels: Channels::All,
             rows,
             left_out: vec![],
             total_seconds: 100.0,

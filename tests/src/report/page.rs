@@ -193,10 +193,11 @@ fn rows_table(report: &Report) -> String {
     let body: String = report.curves().into_iter().flat_map(|(_, rows)| rows).map(table_row).collect();
     format!(
         "<h2>Measurements</h2>\n<p>Times are medians over frames that took turns with all others, with the least and the \
-         greatest. Errors are over all pixels and four channels; colour differences are CIE 1976 L*u*v* over the scene's \
+         greatest. Errors are over all pixels and {}; colour differences are CIE 1976 L*u*v* over the scene's \
          background. Click a heading to sort.</p>\n<div class=\"scroll\"><table>\n<thead><tr><th>front</th><th>backend</th>\
          <th>mode</th><th>rule</th><th>step</th><th>samples</th><th>median ms</th><th>min</th><th>max</th><th>device ms</th>\
-         <th>frames</th><th>RMSE</th><th>max</th><th>99.9 %</th><th>&Delta;E mean</th><th>&Delta;E 95 %</th></tr></thead>\n<tbody>\n{body}</tbody>\n</table></div>\n"
+         <th>frames</th><th>RMSE</th><th>max</th><th>99.9 %</th><th>&Delta;E mean</th><th>&Delta;E 95 %</th></tr></thead>\n<tbody>\n{body}</tbody>\n</table></div>\n",
+        report.channels.words()
     )
 }
 

@@ -145,7 +145,7 @@ fn axes(svg: &mut String, xs: LogAxis, ys: LogAxis, against: Against) -> impl Fn
         .x_desc(against.title())
         .x_label_formatter(&|x| against.tick(*x))
         .y_label_formatter(&|y| format!("{y:e}"))
-        .y_desc("error: RMSE over all channels")
+        .y_desc("error: RMSE")
         .axis_desc_style(("sans-serif", 17).into_font().color(&text))
         .label_style(("sans-serif", 15).into_font().color(&text))
         .axis_style(RGBColor(150, 158, 170))
@@ -196,7 +196,7 @@ fn label(row: &Row) -> String {
     )
 }
 
-/// A mark whose shape says the backend: cpu a disc, wgpu a square, ash a triangle.
+/// A mark whose shape says the backend: cpu a disc, wgpu a square, ash a triangle; peers have corners of their own.
 pub(super) fn marker(backend: &str, (x, y): (i32, i32), color: &str, fill: &str, title: &str) -> String {
     let style = format!("fill=\"{fill}\" stroke=\"{color}\" stroke-width=\"1.6\"");
     let title = format!("<title>{title}</title>");
@@ -206,9 +206,36 @@ pub(super) fn marker(backend: &str, (x, y): (i32, i32), color: &str, fill: &str,
             format!("<rect x=\"{}\" y=\"{}\" width=\"8\" height=\"8\" {style}>{title}</rect>", x - 4, y - 4)
         }
         _ => {
-            let points = format!("{x},{} {},{} {},{}", y - 6, x - 5, y + 4, x + 5, y + 4);
+            let points = corners(backend).iter().map(|(right, down)| format!("{},{}", x + right, y + down));
+            let points = points.collect::<Vec<_>>().join(" ");
             format!("<polygon points=\"{points}\" {style}>{title}</polygon>")
         }
+    }
+}
+
+/// The corners of a mark, to the right and down from its middle.
+fn corners(backend: &str) -> &'static [(i32, i32)] {
+    match backend {
+        "vtk-fixed" => &[(0, -6), (6, 0), (0, 6), (-6, 0)],
+        "vtk-gpu" => &[(0, 6), (-5, -4), (5, -4)],
+        "pygfx" => &[
+            (-2, -6),
+            (2, -6),
+            (2, -2),
+            (6, -2),
+            (6, 2),
+            (2, 2),
+            (2, 6),
+            (-2, 6),
+            (-2, 2),
+            (-6, 2),
+            (-6, -2),
+            (-2, -2),
+        ],
+        "vispy" => {
+            &[(0, -3), (3, -6), (6, -3), (3, 0), (6, 3), (3, 6), (0, 3), (-3, 6), (-6, 3), (-3, 0), (-6, -3), (-3, -6)]
+        }
+        _ => &[(0, -6), (-5, 4), (5, 4)],
     }
 }
 
@@ -256,6 +283,7 @@ pub(super) fn rule_color(rule: &str) -> &'static str {
         "midpoint" => "#0072b2",
         "pre-integrated" => "#009e73",
         "gauss2" => "#b5489a",
+        "other-build" => "#e69f00",
         _ => "#333333",
     }
 }

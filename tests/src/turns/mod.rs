@@ -11,13 +11,16 @@
 
 mod claim;
 mod contestant;
+mod lines;
 mod ratio;
 mod server;
 
 pub use claim::{Bound, Claim, Claims};
 pub use contestant::{Contestant, FrameError, TimedFrame, tree_frame};
+pub(crate) use lines::LineProcess;
+pub use lines::ServerError;
 pub use ratio::{CONFIDENCE, Ratio, Spread, Standing};
-pub use server::{Offer, Server, ServerError, serve};
+pub use server::{Offer, Server, serve};
 
 /// A contestant's turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

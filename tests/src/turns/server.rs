@@ -4,11 +4,13 @@
 //! a contestant's number, counted from 0; its answer is a line with the milliseconds of a frame. It ends with its input.
 
 use std::ffi::OsString;
-use std::io::{self, BufRead, BufReader, Write};
-use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::io::{self, BufRead, Write};
+use std::path::Path;
+use std::process::Command;
 
 use serde::{Deserialize, Serialize};
+
+use super::lines::{LineProcess, Lines, ServerError};
 
 /// A contestant of a server.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -21,22 +23,8 @@ pub struct Offer {
 
 /// A process that serves frames.
 pub struct Server {
-    program: PathBuf,
-    child: Child,
-    requests: Option<ChildStdin>,
-    answers: BufReader<ChildStdout>,
+    process: LineProcess,
     offers: Vec<Offer>,
-}
-
-/// Why a server gives no time.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-#[allow(missing_docs)]
-pub enum ServerError {
-    #[error("{}: {source}", program.display())]
-    Io { program: PathBuf, source: io::Error },
-    #[error("{}: it wrote {answer:?}, and not {expected}", program.display())]
-    Answer { program: PathBuf, answer: String, expected: &'static str },
 }
 
 /// Serves frames over `requests` and `answers` until the requests end; `frame` renders a frame of a contestant and returns its
@@ -71,15 +59,9 @@ impl Server {
     /// # Errors
     /// A program that cannot be started, or that offers no contestants.
     pub fn start(program: &Path, arguments: &[OsString]) -> Result<Server, ServerError> {
-        let io = |source| ServerError::Io { program: program.to_owned(), source };
-        let mut command = Command::new(program);
-        let mut child = command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().map_err(io)?;
-        let requests = child.stdin.take();
-        let mut answers = BufReader::new(child.stdout.take().expect("standard output is a pipe"));
-        let offers = read_offers(program, &mut answers);
-        let mut server = Server { program: program.to_owned(), child, requests, answers, offers: Vec::new() };
-        server.offers = offers?;
-        Ok(server)
+        let mut process = LineProcess::start(Command::new(program).args(arguments))?;
+        let offers = read_offers(process.lines())?;
+        Ok(Server { process, offers })
     }
 
     /// The contestants.
@@ -92,53 +74,25 @@ impl Server {
     /// # Errors
     /// A process that has ended, or that answers no time.
     pub fn frame(&mut self, contestant: usize) -> Result<f64, ServerError> {
-        let requests = self.requests.as_mut().expect("standard input is open until the server is dropped");
-        ask(&self.program, requests, &mut self.answers, contestant)
+        frame(self.process.lines(), contestant)
     }
 }
 
-impl Drop for Server {
-    /// Ends the process by ending its input.
-    fn drop(&mut self) {
-        drop(self.requests.take());
-        // Whatever it says now, no time depends on it.
-        let _ = self.child.wait();
-    }
-}
-
-fn read_offers(program: &Path, answers: &mut impl BufRead) -> Result<Vec<Offer>, ServerError> {
+fn read_offers<W: Write, R: BufRead>(lines: &mut Lines<W, R>) -> Result<Vec<Offer>, ServerError> {
     let mut offers = Vec::new();
     loop {
-        let line = read_line(program, answers)?;
-        if line == "\n" {
+        let line = lines.line("a contestant")?;
+        if line.is_empty() {
             return Ok(offers);
         }
         let offer = serde_json::from_str(&line);
-        offers.push(offer.map_err(|_| unexpected(program, &line, "a contestant"))?);
+        offers.push(offer.map_err(|_| lines.unexpected(&line, "a contestant"))?);
     }
 }
 
-fn ask(
-    program: &Path,
-    requests: &mut impl Write,
-    answers: &mut impl BufRead,
-    contestant: usize,
-) -> Result<f64, ServerError> {
-    let asked = writeln!(requests, "{contestant}").and_then(|()| requests.flush());
-    asked.map_err(|source| ServerError::Io { program: program.to_owned(), source })?;
-    let line = read_line(program, answers)?;
-    line.trim().parse().map_err(|_| unexpected(program, &line, "milliseconds"))
-}
-
-/// A line with its end; empty where the process has ended.
-fn read_line(program: &Path, answers: &mut impl BufRead) -> Result<String, ServerError> {
-    let mut line = String::new();
-    let read = answers.read_line(&mut line);
-    read.map(|_| line).map_err(|source| ServerError::Io { program: program.to_owned(), source })
-}
-
-fn unexpected(program: &Path, answer: &str, expected: &'static str) -> ServerError {
-    ServerError::Answer { program: program.to_owned(), answer: answer.to_owned(), expected }
+fn frame<W: Write, R: BufRead>(lines: &mut Lines<W, R>, contestant: usize) -> Result<f64, ServerError> {
+    let line = lines.ask(&contestant.to_string(), "milliseconds")?;
+    line.trim().parse().map_err(|_| lines.unexpected(&line, "milliseconds"))
 }
 
 #[cfg(test)]
@@ -152,14 +106,14 @@ mod tests {
     #[test]
     fn a_server_says_what_it_offers_and_answers_each_request() {
         let mut answers = Vec::new();
-        let frame = |contestant: usize| Ok::<f64, io::Error>(1.5 + contestant as f64);
-        serve(&offers(), "1\n0\n".as_bytes(), &mut answers, frame).unwrap();
-        let (program, mut answers, mut requests) = (Path::new("speed"), answers.as_slice(), Vec::new());
-        assert_eq!(read_offers(program, &mut answers).unwrap(), offers());
-        assert_eq!(ask(program, &mut requests, &mut answers, 1).unwrap(), 2.5);
-        assert_eq!(ask(program, &mut requests, &mut answers, 0).unwrap(), 1.5);
-        assert_eq!(requests, b"1\n0\n");
-        let ended = ask(program, &mut requests, &mut answers, 0).unwrap_err();
+        let served = |contestant: usize| Ok::<f64, io::Error>(1.5 + contestant as f64);
+        serve(&offers(), "1\n0\n".as_bytes(), &mut answers, served).unwrap();
+        let mut lines = Lines { program: "speed".into(), requests: Vec::new(), answers: answers.as_slice() };
+        assert_eq!(read_offers(&mut lines).unwrap(), offers());
+        assert_eq!(frame(&mut lines, 1).unwrap(), 2.5);
+        assert_eq!(frame(&mut lines, 0).unwrap(), 1.5);
+        assert_eq!(lines.requests, b"1\n0\n");
+        let ended = frame(&mut lines, 0).unwrap_err();
         assert_eq!(ended.to_string(), "speed: it wrote \"\", and not milliseconds");
     }
 

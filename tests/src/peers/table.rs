@@ -1,0 +1,149 @@
+//! The run as tables.
+
+use std::fmt::Write;
+
+use comfy_table::{CellAlignment, Table, presets::NOTHING};
+
+use super::first::FirstReport;
+use super::measure::{ContestantInfo, Measured, SceneReport, StepReport};
+use super::protocol::Domain;
+use super::standing::{BOUNDS, TimeRatio};
+use crate::report::step_label;
+use crate::turns::Spread;
+
+/// The scene, who takes part, and who does not.
+pub(super) fn heading(scene: &SceneReport) -> String {
+    let [x, y, z] = scene.dims;
+    let (who, notes) = (who(&scene.contestants), checked(&scene.contestants));
+    format!("\n{}: {x} x {y} x {z} {}\n{who}\n{notes}", scene.name, scene.scalar)
+}
+
+/// A line if a build has debug assertions: `cargo test` puts such a program where `cargo build` puts the optimized one.
+fn checked(contestants: &[ContestantInfo]) -> String {
+    let checked = contestants.iter().filter(|c| c.version.contains("checked build"));
+    let names: Vec<&str> = checked.map(|c| c.name.as_str()).collect();
+    if names.is_empty() {
+        return String::new();
+    }
+    format!("note: {}: of a checked build, whose times say little; build it anew, without tests\n", names.join(", "))
+}
+
+fn who(contestants: &[ContestantInfo]) -> Table {
+    let mut lines = Table::new();
+    lines.load_preset(NOTHING);
+    for c in contestants {
+        let held = match c.domain {
+            Some(Domain::Voxels) => "whole voxels",
+            Some(Domain::Centres) => "between sample centres",
+            None => "absent",
+        };
+        let what = c.absent.clone().unwrap_or_else(|| format!("{}; {}", c.version, c.device));
+        lines.add_row([c.name.as_str(), held, what.as_str()]);
+    }
+    lines
+}
+
+/// The cheapest step of each contestant that reaches an error.
+pub(super) fn times_to_errors(scene: &SceneReport) -> String {
+    let mut lines = Table::new();
+    let header = BOUNDS.map(|bound| format!("RMSE {bound:e}"));
+    lines.load_preset(NOTHING).set_header(std::iter::once("contestant".to_owned()).chain(header));
+    for times in scene.times_to_errors.chunks(BOUNDS.len()) {
+        let reached = times.iter().map(|time| time.reached.to_string());
+        lines.add_row(std::iter::once(times[0].contestant.clone()).chain(reached));
+    }
+    format!("{}: the cheapest step that reaches an error\n{lines}\n", scene.name)
+}
+
+/// From a file to the first picture.
+pub(super) fn first(report: &FirstReport) -> String {
+    let [x, y, z] = report.dims;
+    let mut lines = Table::new();
+    lines.load_preset(NOTHING).set_header(["contestant", "file to picture", "", "CPU", "process", "its parts"]);
+    for p in &report.pictures {
+        let parts: Vec<String> = p.parts.iter().map(|(name, ms)| format!("{name} {:.0}", ms.median)).collect();
+        let (range, process) = (range(&p.wall), format!("{:.0}", p.process.median));
+        let times = [format!("{:.0}", p.wall.median), range, format!("{:.0}", p.cpu.median), process];
+        lines.add_row(std::iter::once(p.contestant.clone()).chain(times).chain([parts.join(", ")]));
+    }
+    lines.column_iter_mut().skip(1).take(4).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    let n = report.pictures.first().map_or(0, |p| p.n_processes);
+    let absent = who(&report.absent);
+    let absent = if report.absent.is_empty() { String::new() } else { format!("{absent}\n") };
+    let label = step_label(report.step_voxels);
+    format!(
+        "\n{}: {x} x {y} x {z} {}, step {label}: ms from the file to the first picture, medians of {n} processes\n{lines}\n{absent}",
+        report.name, report.scalar
+    )
+}
+
+/// A step: a line for each contestant, then the ratios of CPU time.
+pub(super) fn step(scene: &SceneReport, step: &StepReport) -> String {
+    let mut lines = Table::new();
+    lines.load_preset(NOTHING).set_header(["contestant", "wall", "", "CPU", "", "RMSE x 1e3", "max"]);
+    lines.add_rows(step.rows.iter().map(row));
+    lines.column_iter_mut().skip(1).for_each(|column| column.set_cell_alignment(CellAlignment::Right));
+    let n_frames = step.rows.first().map_or(0, |r| r.wall_ms.len());
+    let label = step_label(step.step_voxels);
+    let mut text = format!("{}, step {label}: ms a frame, medians of {n_frames}\n{lines}\n", scene.name);
+    for c in scene.contestants.iter().filter(|c| c.domain.is_some()) {
+        if let Some(reason) = &c.absent {
+            let _ = writeln!(text, "failed: {}: {reason}", c.name);
+        }
+    }
+    if !step.ratios.is_empty() {
+        let mut lines = Table::new();
+        lines.load_preset(NOTHING).set_header(["CPU time as a ratio", "", "wall time"]);
+        let ratio = |r: &TimeRatio| [format!("{} / {}", r.of, r.to), r.cpu.to_string(), r.wall.to_string()];
+        lines.add_rows(step.ratios.iter().map(ratio));
+        let _ = writeln!(text, "{lines}");
+    }
+    text
+}
+
+fn row(r: &Measured) -> [String; 7] {
+    [
+        r.contestant.clone(),
+        format!("{:.1}", r.wall.median),
+        range(&r.wall),
+        format!("{:.1}", r.cpu.median),
+        range(&r.cpu),
+        format!("{:.3}", 1e3 * r.rmse),
+        format!("{:.4}", r.max_abs),
+    ]
+}
+
+fn range(spread: &Spread) -> String {
+    format!("({:.1} to {:.1})", spread.min, spread.max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::peers::standing::tests::row as measured;
+    use crate::peers::standing::times_to_errors as of_steps;
+
+    #[test]
+    fn peers_tables_have_a_line_for_each_contestant() {
+        let rows = vec![measured("cpu fast", 0.5, 20.0, 1.84e-4), measured("pygfx", 0.5, 40.0, 1.646e-3)];
+        let report = StepReport { step_voxels: 0.5, rows, ratios: Vec::new() };
+        let scene = SceneReport {
+            name: "blobs-256".to_owned(),
+            dims: [256; 3],
+            scalar: "u8".to_owned(),
+            contestants: Vec::new(),
+            times_to_errors: of_steps(std::slice::from_ref(&report)),
+            steps: Vec::new(),
+        };
+        let text = step(&scene, &report);
+        let words = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
+        let lines: Vec<String> = text.lines().map(words).collect();
+        assert_eq!(lines[0], "blobs-256, step 1/2: ms a frame, medians of 3");
+        assert_eq!(lines[2], "cpu fast 10.0 (9.0 to 11.0) 20.0 (18.0 to 22.0) 0.184 0.0018");
+        assert!(lines[3].starts_with("pygfx 20.0") && lines[3].ends_with("1.646 0.0165"), "{text}");
+        let text = times_to_errors(&scene);
+        let lines: Vec<String> = text.lines().map(words).collect();
+        assert_eq!(lines[2], "cpu fast step 1/2: 10.0 ms, CPU 20.0 ms never (least error 1.84e-4)");
+        assert_eq!(lines[3], "pygfx never (least error 1.65e-3) never (least error 1.65e-3)");
+    }
+}
