@@ -54,7 +54,7 @@ mutants! {
     INDEX_STRIDE: "index-stride", "index", "cell_number", "cell.x + dims.x * (cell.y + dims.y * cell.z)"
         => "cell.x + dims.y * (cell.y + dims.x * cell.z)";
     /// The next slot's brick.
-    ATLAS_ROW: "atlas-row", "field/bricks", "texel_of", "let row = slot / bricks.x;" => "let row = slot / bricks.y;";
+    ATLAS_ROW: "atlas-row", "field/bricks", "texel_of", "divided(slot, frame.atlas_bricks.x)" => "divided(slot, frame.atlas_bricks.y)";
     /// Coarse bricks are read as if they were fine.
     LEVEL_SCALE: "level-scale", "field/bricks", "patch_of", "area.scale = 1.0 / f32(1u << block.reach);" => "area.scale = 1.0;";
     /// Coarse bricks begin at the cell, not at their block.
@@ -83,12 +83,12 @@ mutants! {
     /// Pre-integrated pieces have the mean colour of their ends.
     PIECE_MEAN: "piece-mean", "preintegrated", "linear_piece", "(2.0 * near.w + far.w) / (3.0 * max(total, 1e-37))" => "0.5";
     /// The transfer function is continuous from the left.
-    LEFT_CONTINUOUS: "left-continuous", "transfer", "further", "knots[next].value <= value" => "knots[next].value < value";
+    LEFT_CONTINUOUS: "left-continuous", "transfer", "is_from", "knot <= value" => "knot < value";
     /// The transfer function goes on beyond its last knot.
-    NOT_CONSTANT_OUTSIDE: "not-constant-outside", "transfer", "on_line", "clamp((value - low.value) * low.per_value, 0.0, 1.0)"
-        => "(value - low.value) * low.per_value";
+    NOT_CONSTANT_OUTSIDE: "not-constant-outside", "transfer", "at_place", "clamp((value - line.value) * line.per_value, 0.0, 1.0)"
+        => "(value - line.value) * line.per_value";
     /// Steps instead of lines between knots.
-    STEPS: "steps", "transfer", "on_line", "low.optics + (high - low.optics) * f" => "low.optics";
+    STEPS: "steps", "transfer", "at_place", "line.optics + (line.high - line.optics) * f" => "line.optics";
     /// Rays pass the pixels' corners.
     PIXEL_CORNER: "pixel-corner", "rays", "pixel_ray", "let at = pixel + 0.5 - 0.5 * vec2f(frame.size.xy);"
         => "let at = pixel - 0.5 * vec2f(frame.size.xy);";
@@ -116,8 +116,8 @@ mutants! {
     LEAPS_TOO_FAR: "leaps-too-far", "integrate/rays", "integrate", "k = end;" => "k = end + 8.0;";
     /// The same, in bricks with segments of their own.
     LEAPS_TOO_FAR_IN_BRICK: "leaps-too-far-in-brick", "integrate/bricks", "integrate_in", "walk.k = end;" => "walk.k = end + 8.0;";
-    /// Of segments with two nodes, the far one may lie anywhere.
-    FAR_NODE_FORGOTTEN: "far-node-forgotten", "segments", "stop_in", "stop = select(k, stop, own);" => "";
+    /// Dark regions reach a segment too far: of one with two nodes, the far one may lie anywhere.
+    FAR_NODE_FORGOTTEN: "far-node-forgotten", "segments", "stop_near", "return stop;" => "return stop + 1.0;";
     /// Macrocells of another row are read.
     MACROCELL_ROW: "macrocell-row", "field/bricks", "dark_around", "at.x + n * (at.y + n * (at.z + n * area.slot))"
         => "at.y + n * (at.x + n * (at.z + n * area.slot))";

@@ -1,4 +1,4 @@
-//! Batches of segments: classified and composited front to back.
+//! Batches of L segments, a multiple of eight: classified and composited front to back.
 //!
 //! Most batches see one stretch of the transfer function, or a few neighbouring ones: then nothing is looked up segment by segment, and a dark
 //! stretch is passed over.
@@ -7,7 +7,6 @@ use std::ops::RangeInclusive;
 
 use brickfield_optics::QuadratureRule;
 
-use super::brick::{LANES, Lanes};
 use super::classify::{Classifier, Stretch};
 use super::scalar::{THIN, alpha, alpha_thin};
 use super::segment::{Ray32, segment};
@@ -17,10 +16,10 @@ const FEW_STRETCHES: usize = 6;
 
 /// The first `n` segments of a rule with one node, from the values there (the last of them in the lanes behind).
 #[inline(always)]
-pub(super) fn one_node(
+pub(super) fn one_node<const L: usize>(
     rule: QuadratureRule,
     transfer: &Classifier,
-    values: &Lanes,
+    values: &[f32; L],
     n: usize,
     length: f32,
     state: &mut Ray32,
@@ -43,10 +42,10 @@ pub(super) fn one_node(
 
 /// The first `n` segments of a rule with two nodes, from the values there (the last of them in the lanes behind).
 #[inline(always)]
-pub(super) fn two_nodes(
+pub(super) fn two_nodes<const L: usize>(
     rule: QuadratureRule,
     transfer: &Classifier,
-    (near, far): (&Lanes, &Lanes),
+    (near, far): (&[f32; L], &[f32; L]),
     n: usize,
     length: f32,
     state: &mut Ray32,
@@ -65,53 +64,60 @@ pub(super) fn two_nodes(
 ///
 /// The colours' sum needs two sums only: of the weights of the stretch's lower end and of its upper.
 #[inline(always)]
-fn linear(rule: QuadratureRule, stretch: &Stretch, values: &Lanes, n: usize, length: f32, state: &mut Ray32) {
-    let (mut place, mut opacity) = ([0f32; LANES], [0f32; LANES]);
-    for l in 0..LANES {
+fn linear<const L: usize>(
+    rule: QuadratureRule,
+    stretch: &Stretch,
+    values: &[f32; L],
+    n: usize,
+    length: f32,
+    state: &mut Ray32,
+) {
+    let (mut place, mut opacity) = ([0f32; L], [0f32; L]);
+    for l in 0..L {
         place[l] = stretch.place(values[l]);
         opacity[l] = stretch.extinction(place[l]) * length;
     }
     let thickest = extent(&opacity).1;
     opacities(rule, &mut opacity, thickest);
-    let weight = weights(&opacity[..n], state);
+    let weight = weights(&opacity, n, state);
     let (low, high) = sums(&weight, &place);
     add(state, stretch.rgba(low, high));
 }
 
 /// Segments whose values lie in some neighbouring stretches: all of them are looked at in each.
 #[inline(always)]
-fn neighbours(
+fn neighbours<const L: usize>(
     rule: QuadratureRule,
     transfer: &Classifier,
     stretches: RangeInclusive<usize>,
-    values: &Lanes,
+    values: &[f32; L],
     n: usize,
     length: f32,
     state: &mut Ray32,
 ) {
-    let (mut place, mut opacity) = ([0f32; LANES], [0f32; LANES]);
+    let (mut place, mut opacity) = ([0f32; L], [0f32; L]);
     for i in stretches.clone() {
         let stretch = transfer.linear(i);
         // Those beyond it are overwritten by its successor.
         let begin = if i == *stretches.start() { f32::NEG_INFINITY } else { transfer.end(i - 1) };
-        for l in 0..LANES {
+        for l in 0..L {
             let there = stretch.place(values[l]);
             let thick = stretch.extinction(there) * length;
-            let is_there = values[l] >= begin;
-            place[l] = if is_there { there } else { place[l] };
-            opacity[l] = if is_there { thick } else { opacity[l] };
+            let is_there = mask(values[l] >= begin);
+            place[l] = either(is_there, there, place[l]);
+            opacity[l] = either(is_there, thick, opacity[l]);
         }
     }
     let thickest = extent(&opacity).1;
     opacities(rule, &mut opacity, thickest);
-    let weight = weights(&opacity[..n], state);
+    let weight = weights(&opacity, n, state);
     let mut sum = [0f32; 4];
     for i in stretches.clone() {
         let end = transfer.end(i);
         let begin = if i == *stretches.start() { f32::NEG_INFINITY } else { transfer.end(i - 1) };
-        let mut own = [0f32; LANES];
-        for l in 0..LANES {
-            own[l] = if values[l] >= begin && values[l] < end { weight[l] } else { 0.0 };
+        let mut own = [0f32; L];
+        for l in 0..L {
+            own[l] = either(mask((values[l] >= begin) & (values[l] < end)), weight[l], 0.0);
         }
         let (low, high) = sums(&own, &place);
         for (sum, x) in sum.iter_mut().zip(transfer.linear(i).rgba(low, high)) {
@@ -121,11 +127,30 @@ fn neighbours(
     add(state, sum);
 }
 
+/// All bits of a word, or none: the compiler makes vectors of it, where it makes branches of `if`.
+#[inline(always)]
+fn mask(is: bool) -> u32 {
+    u32::from(is).wrapping_neg()
+}
+
+/// The first number under a full mask, else the second.
+#[inline(always)]
+fn either(mask: u32, a: f32, b: f32) -> f32 {
+    f32::from_bits((a.to_bits() & mask) | (b.to_bits() & !mask))
+}
+
 /// Segments whose values lie anywhere.
 #[inline(always)]
-fn mixed(rule: QuadratureRule, transfer: &Classifier, values: &Lanes, n: usize, length: f32, state: &mut Ray32) {
-    let (mut stretches, mut place, mut opacity) = ([0usize; LANES], [0f32; LANES], [0f32; LANES]);
-    for l in 0..LANES {
+fn mixed<const L: usize>(
+    rule: QuadratureRule,
+    transfer: &Classifier,
+    values: &[f32; L],
+    n: usize,
+    length: f32,
+    state: &mut Ray32,
+) {
+    let (mut stretches, mut place, mut opacity) = ([0usize; L], [0f32; L], [0f32; L]);
+    for l in 0..L {
         stretches[l] = transfer.stretch(values[l]);
         let stretch = transfer.linear(stretches[l]);
         place[l] = stretch.place(values[l]);
@@ -133,7 +158,7 @@ fn mixed(rule: QuadratureRule, transfer: &Classifier, values: &Lanes, n: usize, 
     }
     let thickest = extent(&opacity).1;
     opacities(rule, &mut opacity, thickest);
-    let weight = weights(&opacity[..n], state);
+    let weight = weights(&opacity, n, state);
     let mut sum = [0f32; 4];
     for l in 0..n {
         let stretch = transfer.linear(stretches[l]);
@@ -155,7 +180,7 @@ fn add(state: &mut Ray32, seen: [f32; 4]) {
 
 /// Turns depths into opacities.
 #[inline(always)]
-fn opacities(rule: QuadratureRule, depth: &mut Lanes, thickest: f32) {
+fn opacities<const L: usize>(rule: QuadratureRule, depth: &mut [f32; L], thickest: f32) {
     match rule {
         QuadratureRule::LeftRiemann => depth.iter_mut().for_each(|d| *d = if *d < 1.0 { *d } else { 1.0 }),
         _ if thickest < THIN => depth.iter_mut().for_each(|d| *d = alpha_thin(*d)),
@@ -163,11 +188,11 @@ fn opacities(rule: QuadratureRule, depth: &mut Lanes, thickest: f32) {
     }
 }
 
-/// How much of each segment's colour is seen; what shines through the batch is left in the state.
+/// How much of the colour of each of the first `n` segments is seen; what shines through the batch is left in the state.
 #[inline(always)]
-fn weights(opacity: &[f32], state: &mut Ray32) -> Lanes {
-    let mut weight = [0f32; LANES];
-    for (w, a) in weight.iter_mut().zip(opacity) {
+fn weights<const L: usize>(opacity: &[f32; L], n: usize, state: &mut Ray32) -> [f32; L] {
+    let mut weight = [0f32; L];
+    for (w, a) in weight.iter_mut().zip(opacity).take(n) {
         *w = state.transmittance as f32 * a;
         state.transmittance *= 1.0 - f64::from(*a);
     }
@@ -176,9 +201,9 @@ fn weights(opacity: &[f32], state: &mut Ray32) -> Lanes {
 
 /// Sums of weight (1 - place) and of weight place.
 #[inline(always)]
-fn sums(weight: &Lanes, place: &Lanes) -> (f32, f32) {
+fn sums<const L: usize>(weight: &[f32; L], place: &[f32; L]) -> (f32, f32) {
     let (mut low, mut high) = ([0f32; 8], [0f32; 8]);
-    for l in 0..LANES {
+    for l in 0..L {
         low[l % 8] += weight[l] * (1.0 - place[l]);
         high[l % 8] += weight[l] * place[l];
     }
@@ -192,14 +217,19 @@ fn total(x: [f32; 8]) -> f32 {
 
 /// Least and greatest number.
 #[inline(always)]
-fn extent(values: &Lanes) -> (f32, f32) {
+fn extent<const L: usize>(values: &[f32; L]) -> (f32, f32) {
     let (mut low, mut high) = ([f32::MAX; 8], [f32::MIN; 8]);
-    for l in 0..LANES {
+    for l in 0..L {
         let v = values[l];
         low[l % 8] = if v < low[l % 8] { v } else { low[l % 8] };
         high[l % 8] = if v > high[l % 8] { v } else { high[l % 8] };
     }
-    let less = |a: f32, b: f32| if b < a { b } else { a };
-    let more = |a: f32, b: f32| if b > a { b } else { a };
-    (low.into_iter().fold(f32::MAX, less), high.into_iter().fold(f32::MIN, more))
+    for half in [4, 2, 1] {
+        for l in 0..half {
+            let (a, b) = (low[l + half], high[l + half]);
+            low[l] = if a < low[l] { a } else { low[l] };
+            high[l] = if b > high[l] { b } else { high[l] };
+        }
+    }
+    (low[0], high[0])
 }

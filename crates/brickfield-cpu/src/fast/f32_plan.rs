@@ -3,7 +3,7 @@
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_frame::{FramePlan, IndexEntry, SampleFormat};
 
-use super::brick::{LANES, Lanes, Nodes, Stored};
+use super::brick::{Nodes, Stored};
 use super::classify::Classifier;
 
 /// A plan whose bricks have N samples a side, stored as `S`.
@@ -121,9 +121,15 @@ impl<'a, const N: usize, S: Stored> F32Plan<'a, N, S> {
 
     /// The values at the first `n` of some nodes, the last of them in the lanes behind.
     #[inline(always)]
-    pub(super) fn first_values(&self, nodes: &Nodes, brick: &[u8], at: &Lanes, n: usize) -> Lanes {
+    pub(super) fn first_values<const L: usize>(
+        &self,
+        nodes: &Nodes,
+        brick: &[u8],
+        at: &[f32; L],
+        n: usize,
+    ) -> [f32; L] {
         let mut values = self.values(nodes, brick, at);
-        if n < LANES {
+        if n < L {
             let last = values[n - 1];
             values[n..].fill(last);
         }

@@ -334,10 +334,18 @@ impl Inner<'_> {
         }
     }
 
-    /// Puts the first `n` segments that wait behind what has been seen so far.
+    /// Puts the first `n` segments that wait behind what has been seen so far. Few take half a batch.
     #[inline(always)]
     fn look<const N: usize, S: Stored>(&self, plan32: &F32Plan<N, S>, n: usize, state: &mut Ray32) {
-        let mut at = [0f32; LANES];
+        match n <= LANES / 2 {
+            true => self.look_at::<N, S, { LANES / 2 }>(plan32, n, state),
+            false => self.look_at::<N, S, LANES>(plan32, n, state),
+        }
+    }
+
+    #[inline(always)]
+    fn look_at<const N: usize, S: Stored, const L: usize>(&self, plan32: &F32Plan<N, S>, n: usize, state: &mut Ray32) {
+        let mut at = [0f32; L];
         for (at, k) in at.iter_mut().zip(&self.waiting) {
             *at = *k as f32;
         }
