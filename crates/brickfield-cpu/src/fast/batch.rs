@@ -14,9 +14,38 @@ use super::segment::{Ray32, segment};
 /// Most further stretches, beside that of the least value, that a batch is looked at in as a whole.
 const FEW_STRETCHES: usize = 6;
 
+/// The first `n` segments of some, and the values at their nodes (in the lanes behind, the last segment's).
+pub(super) struct Batch<'a, const L: usize> {
+    pub(super) rule: QuadratureRule,
+    pub(super) transfer: &'a Classifier,
+    pub(super) near: &'a [f32; L],
+    /// Of a rule with two nodes.
+    pub(super) far: Option<&'a [f32; L]>,
+    pub(super) n: usize,
+    pub(super) length: f32,
+}
+
+impl<const L: usize> Batch<'_, L> {
+    /// Puts the segments behind what has been seen so far. One function for bricks of all kinds: what is inlined below it would take minutes to
+    /// compile for each of them.
+    #[inline(never)]
+    pub(super) fn push(self, simd: pulp::Arch, state: &mut Ray32) {
+        simd.dispatch(
+            #[inline(always)]
+            || {
+                let Batch { rule, transfer, near, far, n, length } = self;
+                match far {
+                    None => one_node(rule, transfer, near, n, length, state),
+                    Some(far) => two_nodes(rule, transfer, (near, far), n, length, state),
+                }
+            },
+        );
+    }
+}
+
 /// The first `n` segments of a rule with one node, from the values there (the last of them in the lanes behind).
 #[inline(always)]
-pub(super) fn one_node<const L: usize>(
+fn one_node<const L: usize>(
     rule: QuadratureRule,
     transfer: &Classifier,
     values: &[f32; L],
@@ -42,7 +71,7 @@ pub(super) fn one_node<const L: usize>(
 
 /// The first `n` segments of a rule with two nodes, from the values there (the last of them in the lanes behind).
 #[inline(always)]
-pub(super) fn two_nodes<const L: usize>(
+fn two_nodes<const L: usize>(
     rule: QuadratureRule,
     transfer: &Classifier,
     (near, far): (&[f32; L], &[f32; L]),

@@ -14,6 +14,8 @@ pub(super) struct F32Plan<'a, const N: usize, S> {
     pub(super) center: DVec3,
     pub(super) last: DVec3,
     pub(super) numbers: Numbers,
+    /// The instructions that the processor has.
+    pub(super) simd: pulp::Arch,
     stored: std::marker::PhantomData<S>,
 }
 
@@ -59,6 +61,7 @@ impl<'a, const N: usize, S: Stored> F32Plan<'a, N, S> {
             last: plan.field().last_sample(),
             numbers: Numbers::of(plan),
             transfer: Classifier::new(plan.transfer(), plan.value_scale()),
+            simd: pulp::Arch::new(),
             stored: std::marker::PhantomData,
         }
     }

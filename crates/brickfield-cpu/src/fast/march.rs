@@ -6,7 +6,7 @@ use brickfield_core::glam::DVec3;
 use brickfield_core::{Level, Span};
 use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, PlanRay, Sampling};
 
-use super::batch;
+use super::batch::Batch;
 use super::brick::{LANES, Nodes, Stored};
 use super::classify::Classifier;
 use super::detail::Sieve;
@@ -349,16 +349,14 @@ impl Inner<'_> {
         for (at, k) in at.iter_mut().zip(&self.waiting) {
             *at = *k as f32;
         }
-        let (rule, length) = (plan32.plan.sampling().rule(), self.length);
+        let rule = plan32.plan.sampling().rule();
         let near = plan32.first_values(&self.nodes, self.brick, &at, n);
-        match rule.nodes().len() {
-            1 => batch::one_node(rule, &plan32.transfer, &near, n, length, state),
-            _ => {
-                at.iter_mut().for_each(|at| *at += self.far);
-                let far = plan32.first_values(&self.nodes, self.brick, &at, n);
-                batch::two_nodes(rule, &plan32.transfer, (&near, &far), n, length, state);
-            }
-        }
+        let far = (rule.nodes().len() > 1).then(|| {
+            at.iter_mut().for_each(|at| *at += self.far);
+            plan32.first_values(&self.nodes, self.brick, &at, n)
+        });
+        let (transfer, length) = (&plan32.transfer, self.length);
+        Batch { rule, transfer, near: &near, far: far.as_ref(), n, length }.push(plan32.simd, state);
     }
 }
 
