@@ -162,6 +162,7 @@ fn a_device_with_few_storage_buffers_gets_a_shader_without_shortcuts() {
     let mut general = Variant::new(unlit, QuadratureRule::MidpointExponential, Entry::March);
     general.long_rays = true;
     general.segments.surfaces = Surfaces::TessellatedShells;
+    general.search = KnotSearch::Loop;
     let library = ShaderLibrary::embedded();
     let within = |limit| library.specialise_within(&general, limit);
     assert_eq!(within(6).unwrap().n_storage_buffers(), 6);
@@ -192,8 +193,8 @@ fn what_a_scene_does_not_need_is_left_out() {
     let rule = QuadratureRule::MidpointExponential;
     // Bricks have no stored gradients.
     let all = FeatureSet::all().without(Feature::StoredGradients);
-    use Resource::{Atlas, AtlasSampler, Beams, Frame, Index, Knots, Light, Occupancy, Picture};
-    let of_general = [Frame, Atlas, AtlasSampler, Index, Knots, Picture, Occupancy, Beams, Light];
+    use Resource::{Atlas, AtlasSampler, Beams, FewKnots, Frame, Index, Knots, Light, Occupancy, Picture};
+    let of_general = [Frame, Atlas, AtlasSampler, Index, Picture, Occupancy, Beams, Light, FewKnots];
     assert_eq!(resources(&march(all, rule)), of_general);
     for (feature, resource) in [
         (Feature::HardwareFilter, AtlasSampler),
@@ -250,20 +251,24 @@ fn what_a_scene_does_not_need_is_left_out() {
     ] {
         assert!(general.wgsl.contains(text) && !march(all.without(feature), rule).wgsl.contains(text), "{text}");
     }
-    assert!(march(unlit, rule).wgsl.contains("fn knot_below"));
-    assert!(!march(unlit.without(Feature::TransferLookup), rule).wgsl.contains("fn knot_below"));
+    assert!(march(unlit, rule).wgsl.contains("fn later"));
+    assert!(!march(unlit.without(Feature::TransferLookup), rule).wgsl.contains("fn later"));
     assert!(!general.wgsl.contains("textureLoad") && !general.wgsl.contains("preintegrate"));
 }
 
 #[test]
 fn functions_bind_what_they_read() {
-    use Resource::{Atlas, Frame, Index, Inputs, Knots, Outputs};
-    let of = |function| {
+    use Resource::{Atlas, FewKnots, Frame, Index, Inputs, Knots, Outputs};
+    let among = |n_knots, function| {
         let features = FeatureSet::default().with(Feature::TransferLookup);
-        resources(&compile(&Variant::new(features, QuadratureRule::Gauss2, Entry::Evaluate(function))))
+        let mut variant = Variant::new(features, QuadratureRule::Gauss2, Entry::Evaluate(function));
+        variant.search = KnotSearch::among(n_knots);
+        resources(&compile(&variant))
     };
+    let of = |function| among(4, function);
     assert_eq!(of(ShaderFunction::Alpha), [Inputs, Outputs]);
-    assert_eq!(of(ShaderFunction::Classify), [Frame, Knots, Inputs, Outputs]);
+    assert_eq!(of(ShaderFunction::Classify), [Frame, Inputs, Outputs, FewKnots]);
+    assert_eq!(among(9, ShaderFunction::Classify), [Frame, Knots, Inputs, Outputs]);
     assert_eq!(of(ShaderFunction::Sample), [Frame, Atlas, Index, Inputs, Outputs]);
     assert_eq!(of(ShaderFunction::RayAnchor), [Frame, Inputs, Outputs]);
 }
