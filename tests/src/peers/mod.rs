@@ -9,7 +9,7 @@
 //! ```
 //!
 //! A contestant is a mode of a backend of this build, the same of another build (`--other`), or a peer: VTK's fixed-point and
-//! GPU mappers, pygfx and vispy, by Python scripts of `tests/peers`. All of them answer the same lines of JSON ([`protocol`]),
+//! GPU mappers, pygfx and vispy, by Python scripts of `tests/peers`. All of them answer the same lines of JSON (`protocol`),
 //! and [`crate::turns`] gives them their turns.
 //!
 //! Pictures are compared as they are seen over black, in three colour channels: not every peer hands out alpha. Each is held
