@@ -69,11 +69,9 @@ impl Resources {
     }
 
     fn entry(&mut self, resource: Resource) -> &mut Reused {
-        let usage = match resource {
-            Resource::Frame | Resource::FewKnots | Resource::Decoding | Resource::MeshView => {
-                vk::BufferUsageFlags::UNIFORM_BUFFER
-            }
-            _ => vk::BufferUsageFlags::STORAGE_BUFFER,
+        let usage = match resource.is_uniform() {
+            true => vk::BufferUsageFlags::UNIFORM_BUFFER,
+            false => vk::BufferUsageFlags::STORAGE_BUFFER,
         };
         self.buffers.entry(resource).or_insert_with(|| Reused::new(resource.name(), usage))
     }

@@ -191,6 +191,11 @@ impl Resource {
         }
     }
 
+    /// Whether shaders read it as a uniform block; other buffers are storage.
+    pub const fn is_uniform(self) -> bool {
+        matches!(self, Resource::Frame | Resource::FewKnots | Resource::Decoding | Resource::MeshView)
+    }
+
     /// The resource of a name.
     pub fn of_name(name: &str) -> Option<Resource> {
         Resource::ALL.into_iter().find(|resource| resource.name() == name)

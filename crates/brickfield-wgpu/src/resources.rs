@@ -48,9 +48,9 @@ impl Resources {
 
     /// The buffer of a resource.
     pub(crate) fn buffer(&mut self, resource: Resource) -> &mut Reused {
-        let usage = match resource {
-            Resource::Frame | Resource::FewKnots | Resource::Decoding | Resource::MeshView => BufferUsages::UNIFORM,
-            _ => BufferUsages::STORAGE,
+        let usage = match resource.is_uniform() {
+            true => BufferUsages::UNIFORM,
+            false => BufferUsages::STORAGE,
         };
         let usage = usage | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         self.buffers.entry(resource).or_insert_with(|| Reused::new(resource.name(), usage))

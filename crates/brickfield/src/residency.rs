@@ -211,8 +211,9 @@ impl SlotTable {
         let (format, runs) = (slots.format(), DarkRuns::of_transfer(transfer, slots.format(), slots.decode()));
         let all_visible = self.all_visible.get_or_insert_with(|| Arc::new(Occupancy::of_visible_brick(side)));
         for (id, slot) in &self.slot_of {
-            if transfer.least_extinction(tree.summary(*id).range) > 0.0 {
-                self.distances[*slot as usize].get_or_insert_with(|| all_visible.clone());
+            let distances = &mut self.distances[*slot as usize];
+            if distances.is_none() && transfer.least_extinction(tree.summary(*id).range) > 0.0 {
+                *distances = Some(all_visible.clone());
             }
         }
         let lists = self.samples.par_iter().zip(&mut self.ranges).zip(&mut self.distances);

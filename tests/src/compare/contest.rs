@@ -7,7 +7,7 @@ use brickfield::options::progress_bar;
 use indicatif::ProgressBar;
 
 use super::CompareError;
-use super::output::{Caption, JudgedPicture, OutputError, Pictures};
+use super::output::{Caption, Effort, JudgedPicture, OutputError, Pictures};
 use super::rivals::Rivals;
 use super::sweep::{Priority, REACHED, SweepPoint};
 use crate::metrics::median;
@@ -159,34 +159,22 @@ impl Contest<'_> {
         let (c, d) = (&self.points[entry.point], self.rivals.present[entry.rival].describe());
         let timings = if entry.timed.is_empty() { vec![entry.warm_up] } else { entry.timed };
         let wall: Vec<f64> = timings.iter().map(|t| t.wall_ms).collect();
-        let spread = Spread::of(&wall);
         let device: Option<Vec<f64>> = timings.iter().map(|t| t.device_ms).collect();
-        let JudgedPicture { errors, delta_e, files, difference } = entry.shown;
-        Row {
-            backend: d.backend.to_owned(),
+        let by = Caption {
+            backend: d.backend,
             adapter: d.adapter.clone(),
-            mode: c.mode.name().to_owned(),
-            rule: c.rule.name().to_owned(),
+            mode: c.mode.name(),
+            rule: c.rule.name(),
             step_voxels: c.step_voxels,
+        };
+        let effort = Effort {
             samples: c.n_samples,
-            min_ms: spread.min,
-            max_ms: spread.max,
-            n_frames: wall.len() as u32,
-            median_ms: spread.median,
+            wall: Spread::of(&wall),
+            n_frames: wall.len(),
             device_ms: device.map(median),
             upload_ms: entry.warm_up.upload_ms,
-            rmse: errors.rmse,
-            max_abs: errors.worst.difference,
-            worst_pixel: errors.worst.pixel.to_array(),
-            p999: errors.p999,
-            delta_e_mean: delta_e.mean,
-            delta_e_p95: delta_e.percentile_95,
-            on_front: false,
-            exr: files.exr,
-            png: files.png,
-            difference_exr: difference.exr,
-            difference_png: difference.png,
-        }
+        };
+        entry.shown.row(by, effort)
     }
 }
 

@@ -8,7 +8,8 @@ use brickfield::optics::ColorDifferences;
 use brickfield::{PictureError, write_exr, write_png};
 
 use crate::metrics::{Errors, MetricError, color_errors, delta_e, errors, opaque};
-use crate::report::{Channels, Report, heat};
+use crate::report::{Channels, Report, Row, heat};
+use crate::turns::Spread;
 
 /// Why the results could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -102,7 +103,7 @@ pub(crate) struct Pictures<'a> {
 /// Who made a picture, and how.
 pub(crate) struct Caption<'a> {
     pub(crate) backend: &'a str,
-    /// With its driver.
+    /// In the attributes of a picture with its driver.
     pub(crate) adapter: String,
     pub(crate) mode: &'a str,
     pub(crate) rule: &'a str,
@@ -115,6 +116,48 @@ pub(crate) struct JudgedPicture {
     pub(crate) delta_e: ColorDifferences,
     pub(crate) files: Files,
     pub(crate) difference: Files,
+}
+
+/// What a picture took.
+pub(crate) struct Effort {
+    pub(crate) samples: u64,
+    /// Milliseconds a frame, and the number of frames.
+    pub(crate) wall: Spread,
+    pub(crate) n_frames: usize,
+    pub(crate) device_ms: Option<f64>,
+    pub(crate) upload_ms: f64,
+}
+
+impl JudgedPicture {
+    /// Its line in the report.
+    pub(crate) fn row(self, by: Caption<'_>, effort: Effort) -> Row {
+        let JudgedPicture { errors, delta_e, files, difference } = self;
+        Row {
+            backend: by.backend.to_owned(),
+            adapter: by.adapter,
+            mode: by.mode.to_owned(),
+            rule: by.rule.to_owned(),
+            step_voxels: by.step_voxels,
+            samples: effort.samples,
+            median_ms: effort.wall.median,
+            min_ms: effort.wall.min,
+            max_ms: effort.wall.max,
+            device_ms: effort.device_ms,
+            upload_ms: effort.upload_ms,
+            n_frames: effort.n_frames as u32,
+            rmse: errors.rmse,
+            max_abs: errors.worst.difference,
+            worst_pixel: errors.worst.pixel.to_array(),
+            p999: errors.p999,
+            delta_e_mean: delta_e.mean,
+            delta_e_p95: delta_e.percentile_95,
+            on_front: false,
+            exr: files.exr,
+            png: files.png,
+            difference_exr: difference.exr,
+            difference_png: difference.png,
+        }
+    }
 }
 
 impl Pictures<'_> {

@@ -11,7 +11,7 @@ use super::process::Contestant;
 use super::protocol::Domain;
 use super::scenes::Subject;
 use super::{PeersArgs, PeersError};
-use crate::compare::output::{Caption, JudgedPicture, OutputError, OutputFolder, Pictures};
+use crate::compare::output::{Caption, Effort, OutputError, OutputFolder, Pictures};
 use crate::compare::{CompareError, drivers, subject::projection_text};
 use crate::report::{
     BackendInfo, Channels, LeftOut, Machine, REPORT_FORMAT, ReferenceInfo, Report, Row, SceneInfo, commit, mark_front,
@@ -78,7 +78,8 @@ impl<'a> Page<'a> {
         let samples = self.n_samples(contestant.opened.domain, step_voxels);
         let upload = frames.first.parts.iter().find(|part| part.name == "upload");
         let upload_ms = upload.map_or(0.0, |part| part.wall_ms);
-        self.rows.push(row(caption, &measured, samples, upload_ms, shown));
+        let (wall, n_frames) = (measured.wall, measured.wall_ms.len());
+        self.rows.push(shown.row(caption, Effort { samples, wall, n_frames, device_ms: None, upload_ms }));
         Ok(Ok(measured))
     }
 
@@ -150,35 +151,6 @@ const fn curve(who: Who) -> (&'static str, &'static str) {
         Who::Own { build: Build::This, mode, .. } => (mode.name(), "midpoint"),
         Who::Own { build: Build::Other, mode, .. } => (mode.name(), OTHER_BUILD),
         Who::Peer(_) => ("fast", "peer"),
-    }
-}
-
-fn row(caption: Caption<'_>, measured: &Measured, samples: u64, upload_ms: f64, shown: JudgedPicture) -> Row {
-    let JudgedPicture { errors, delta_e, files, difference } = shown;
-    Row {
-        backend: caption.backend.to_owned(),
-        adapter: caption.adapter,
-        mode: caption.mode.to_owned(),
-        rule: caption.rule.to_owned(),
-        step_voxels: caption.step_voxels,
-        samples,
-        median_ms: measured.wall.median,
-        min_ms: measured.wall.min,
-        max_ms: measured.wall.max,
-        device_ms: None,
-        upload_ms,
-        n_frames: measured.wall_ms.len() as u32,
-        rmse: errors.rmse,
-        max_abs: errors.worst.difference,
-        worst_pixel: errors.worst.pixel.to_array(),
-        p999: errors.p999,
-        delta_e_mean: delta_e.mean,
-        delta_e_p95: delta_e.percentile_95,
-        on_front: false,
-        exr: files.exr,
-        png: files.png,
-        difference_exr: difference.exr,
-        difference_png: difference.png,
     }
 }
 

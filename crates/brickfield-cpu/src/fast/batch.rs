@@ -101,14 +101,12 @@ fn linear<const L: usize>(
     length: f32,
     state: &mut Ray32,
 ) {
-    let (mut place, mut opacity) = ([0f32; L], [0f32; L]);
+    let (mut place, mut depth) = ([0f32; L], [0f32; L]);
     for l in 0..L {
         place[l] = stretch.place(values[l]);
-        opacity[l] = stretch.extinction(place[l]) * length;
+        depth[l] = stretch.extinction(place[l]) * length;
     }
-    let thickest = extent(&opacity).1;
-    opacities(rule, &mut opacity, thickest);
-    let weight = weights(&opacity, n, state);
+    let weight = weights(rule, depth, n, state);
     let (low, high) = sums(&weight, &place);
     add(state, stretch.rgba(low, high));
 }
@@ -124,26 +122,24 @@ fn neighbours<const L: usize>(
     length: f32,
     state: &mut Ray32,
 ) {
-    let (mut place, mut opacity) = ([0f32; L], [0f32; L]);
+    let (mut place, mut depth) = ([0f32; L], [0f32; L]);
+    let begin = |i: usize| if i == *stretches.start() { f32::NEG_INFINITY } else { transfer.end(i - 1) };
     for i in stretches.clone() {
         let stretch = transfer.linear(i);
         // Those beyond it are overwritten by its successor.
-        let begin = if i == *stretches.start() { f32::NEG_INFINITY } else { transfer.end(i - 1) };
+        let begin = begin(i);
         for l in 0..L {
             let there = stretch.place(values[l]);
             let thick = stretch.extinction(there) * length;
             let is_there = mask(values[l] >= begin);
             place[l] = either(is_there, there, place[l]);
-            opacity[l] = either(is_there, thick, opacity[l]);
+            depth[l] = either(is_there, thick, depth[l]);
         }
     }
-    let thickest = extent(&opacity).1;
-    opacities(rule, &mut opacity, thickest);
-    let weight = weights(&opacity, n, state);
+    let weight = weights(rule, depth, n, state);
     let mut sum = [0f32; 4];
     for i in stretches.clone() {
-        let end = transfer.end(i);
-        let begin = if i == *stretches.start() { f32::NEG_INFINITY } else { transfer.end(i - 1) };
+        let (begin, end) = (begin(i), transfer.end(i));
         let mut own = [0f32; L];
         for l in 0..L {
             own[l] = either(mask((values[l] >= begin) & (values[l] < end)), weight[l], 0.0);
@@ -178,16 +174,14 @@ fn mixed<const L: usize>(
     length: f32,
     state: &mut Ray32,
 ) {
-    let (mut stretches, mut place, mut opacity) = ([0usize; L], [0f32; L], [0f32; L]);
+    let (mut stretches, mut place, mut depth) = ([0usize; L], [0f32; L], [0f32; L]);
     for l in 0..L {
         stretches[l] = transfer.stretch(values[l]);
         let stretch = transfer.linear(stretches[l]);
         place[l] = stretch.place(values[l]);
-        opacity[l] = stretch.extinction(place[l]) * length;
+        depth[l] = stretch.extinction(place[l]) * length;
     }
-    let thickest = extent(&opacity).1;
-    opacities(rule, &mut opacity, thickest);
-    let weight = weights(&opacity, n, state);
+    let weight = weights(rule, depth, n, state);
     let mut sum = [0f32; 4];
     for l in 0..n {
         let stretch = transfer.linear(stretches[l]);
@@ -207,25 +201,26 @@ fn add(state: &mut Ray32, seen: [f32; 4]) {
     }
 }
 
-/// Turns depths into opacities.
+/// How much of the colour of each of the first `n` segments is seen, by their depths; what shines through the batch is left in the state.
 #[inline(always)]
-fn opacities<const L: usize>(rule: QuadratureRule, depth: &mut [f32; L], thickest: f32) {
+fn weights<const L: usize>(rule: QuadratureRule, depth: [f32; L], n: usize, state: &mut Ray32) -> [f32; L] {
+    let mut weight = [0f32; L];
+    for (w, a) in weight.iter_mut().zip(opacities(rule, depth)).take(n) {
+        *w = state.transmittance as f32 * a;
+        state.transmittance *= 1.0 - f64::from(a);
+    }
+    weight
+}
+
+#[inline(always)]
+fn opacities<const L: usize>(rule: QuadratureRule, mut depth: [f32; L]) -> [f32; L] {
+    let thickest = extent(&depth).1;
     match rule {
         QuadratureRule::LeftRiemann => depth.iter_mut().for_each(|d| *d = if *d < 1.0 { *d } else { 1.0 }),
         _ if thickest < THIN => depth.iter_mut().for_each(|d| *d = alpha_thin(*d)),
         _ => depth.iter_mut().for_each(|d| *d = alpha(*d)),
     }
-}
-
-/// How much of the colour of each of the first `n` segments is seen; what shines through the batch is left in the state.
-#[inline(always)]
-fn weights<const L: usize>(opacity: &[f32; L], n: usize, state: &mut Ray32) -> [f32; L] {
-    let mut weight = [0f32; L];
-    for (w, a) in weight.iter_mut().zip(opacity).take(n) {
-        *w = state.transmittance as f32 * a;
-        state.transmittance *= 1.0 - f64::from(*a);
-    }
-    weight
+    depth
 }
 
 /// Sums of weight (1 - place) and of weight place.
