@@ -6,8 +6,8 @@ use std::time::Instant;
 use brickfield_core::Image as Picture;
 use brickfield_core::glam::UVec2;
 use brickfield_frame::{
-    Backend, Capabilities, Cost, Description, Evaluate, Frame, FramePlan, ProxyGeometry, RenderError, Resource,
-    ShaderChoice, ShaderFunction, Target, Timing, check_memory, draw_batches,
+    Backend, Cost, Description, Evaluate, Frame, FramePlan, ProxyGeometry, RenderError, Resource, ShaderChoice,
+    ShaderFunction, Target, Timing, check_memory, draw_batches,
 };
 use brickfield_shaders::{Chosen, PipelineKey, Pipelines, ShaderLibrary, n_rays_that_go_on, passes};
 
@@ -242,14 +242,7 @@ impl Evaluate for AshBackend {
 }
 
 fn describe(device: &PhysicalDevice) -> Description {
-    let limits = &device.limits;
-    let mut capabilities = Capabilities::UNLIMITED;
-    capabilities.max_texture_3d = limits.max_image_dimension3_d;
-    capabilities.max_image = limits.max_image_dimension2_d;
-    capabilities.max_buffer_bytes = u64::from(limits.max_storage_buffer_range);
-    capabilities.max_storage_buffers = limits.max_per_stage_descriptor_storage_buffers;
-    capabilities.sub_texel_bits = limits.sub_texel_precision_bits;
-    Description::new("ash", device.summary.name.clone(), device.summary.driver.clone(), capabilities)
+    Description::new("ash", device.summary.name.clone(), device.summary.driver.clone(), device.capabilities())
 }
 
 #[cfg(test)]

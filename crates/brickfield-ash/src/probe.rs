@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use ash::vk;
 use brickfield_core::glam::UVec3;
-use brickfield_frame::{Fetch, Probe, RenderError, Resource, TextureReads, TextureWork};
+use brickfield_frame::{Probe, RenderError, Resource, TextureReads, TextureWork};
 use brickfield_shaders::{PipelineKey, Variant};
 
 use crate::AshBackend;
@@ -16,7 +16,7 @@ use crate::vulkan::{Bindable, ImageBox, Sampler, Use, VulkanImage};
 
 impl Probe for AshBackend {
     fn texture_reads(&mut self, work: &TextureWork, n_runs: usize) -> Result<TextureReads, RenderError> {
-        let (texture, sampler) = (self.noise(work)?, Sampler::linear(&self.device)?);
+        let (texture, sampler) = (self.noise(work)?, Sampler::of(work.fetch.layout(), &self.device)?);
         let mut uniforms = Reused::new("the probe's uniforms", vk::BufferUsageFlags::UNIFORM_BUFFER);
         let mut means = Reused::new("the means of rays", vk::BufferUsageFlags::STORAGE_BUFFER);
         let contents = work.uniforms();
@@ -30,7 +30,7 @@ impl Probe for AshBackend {
                 match binding.resource {
                     Resource::Probe => uniforms.bindable(),
                     Resource::Atlas => Some(Bindable::Texture(&texture)),
-                    Resource::AtlasSampler => Some(Bindable::Sampler(&sampler)),
+                    Resource::AtlasSampler | Resource::NearestSampler => Some(Bindable::Sampler(&sampler)),
                     Resource::Means => means.bindable(),
                     _ => None,
                 }
@@ -52,11 +52,13 @@ impl Probe for AshBackend {
 impl AshBackend {
     /// The texture of a probe, layers by layers.
     fn noise(&mut self, work: &TextureWork) -> Result<VulkanImage, RenderError> {
-        check_format(&self.device, work.format, work.fetch == Fetch::Filtered)?;
-        if work.texels.max_element() > self.device.physical().limits.max_image_dimension3_d {
-            return Err(RenderError::Unsupported { what: "hold a 3-D texture with that many texels a side" });
+        let layout = work.fetch.layout();
+        check_format(&self.device, work.format, layout)?;
+        let limit = self.device.physical().capabilities().max_texels(layout);
+        if work.texels.max_element() > limit {
+            return Err(RenderError::TextureTooLarge { texels: work.texels, limit });
         }
-        let image = VulkanImage::texture_3d(&self.device, work.format, work.texels)?;
+        let image = VulkanImage::texture(&self.device, work.format, layout, work.texels)?;
         self.queue.run("preparing a texture", |recorder| {
             recorder.image_barrier(&image, Use::Nothing, Use::CopyTarget);
         })?;

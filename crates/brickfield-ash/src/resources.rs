@@ -7,7 +7,7 @@ use std::sync::Arc;
 use ash::vk;
 use brickfield_core::BrickSide;
 use brickfield_frame::{
-    AtlasShape, Chunked, Content, FramePlan, FrameUniforms, HeldChunks, RenderError, Resource, Slots,
+    AtlasShape, Chunked, Content, FramePlan, FrameUniforms, HeldChunks, RenderError, Resource, Slots, TextureLayout,
 };
 use brickfield_shaders::{Binding, BindingKind, PipelineKey, Pipelines, decodings};
 
@@ -22,7 +22,8 @@ pub(crate) struct Resources {
     device: Arc<Device>,
     buffers: BTreeMap<Resource, Reused>,
     textures: BTreeMap<Resource, Texture>,
-    sampler: Sampler,
+    linear: Sampler,
+    nearest: Sampler,
 }
 
 /// A buffer that grows when it must, how much of it is used, and the chunks that are in it.
@@ -48,7 +49,8 @@ impl Resources {
             device: device.clone(),
             buffers: BTreeMap::new(),
             textures: BTreeMap::new(),
-            sampler: Sampler::linear(device)?,
+            linear: Sampler::of(TextureLayout::Volume, device)?,
+            nearest: Sampler::of(TextureLayout::Layers, device)?,
         })
     }
 
@@ -93,9 +95,8 @@ impl Resources {
                 Some(Content::Bytes(bytes)) => numbers.push((*resource, bytes)),
                 Some(Content::Chunks(chunks)) => lists.push((*resource, chunks)),
                 Some(Content::Texture(slots)) => {
-                    let filtered = bindings.iter().any(|b| b.kind == BindingKind::Sampler);
                     let texture = self.textures.remove(resource);
-                    let mut texture = Texture::with_room(&device, queue, slots, filtered, texture)?;
+                    let mut texture = Texture::with_room(&device, queue, slots, plan.texture_layout(), texture)?;
                     let decoder = decoder.map(|key| pipelines.of(key)).transpose()?;
                     n_bytes += self.fill_texture(queue, staging, slots, decoder, &texture)?;
                     texture.hold(slots);
@@ -243,8 +244,9 @@ impl Resources {
             BindingKind::Uniform | BindingKind::StorageRead | BindingKind::StorageReadWrite => {
                 self.buffers.get(&binding.resource)?.bindable()
             }
-            BindingKind::Texture3d => Some(Bindable::Texture(self.textures.get(&binding.resource)?.image())),
-            BindingKind::Sampler => Some(Bindable::Sampler(&self.sampler)),
+            BindingKind::Texture(_) => Some(Bindable::Texture(self.textures.get(&binding.resource)?.image())),
+            BindingKind::Sampler(TextureLayout::Volume) => Some(Bindable::Sampler(&self.linear)),
+            BindingKind::Sampler(TextureLayout::Layers) => Some(Bindable::Sampler(&self.nearest)),
             BindingKind::StorageImage => None,
         }
     }

@@ -1,10 +1,10 @@
-//! The samples of slots in a 3-D texture.
+//! The samples of slots in a texture of three axes.
 
 use std::sync::Arc;
 
 use ash::vk;
 use brickfield_frame::{
-    AtlasShape, Chunked, HeldChunks, RenderError, Room, RoomChange, SampleFormat, Slots, TextureShape,
+    AtlasShape, Chunked, HeldChunks, RenderError, Room, RoomChange, SampleFormat, Slots, TextureLayout, TextureShape,
 };
 
 use crate::staging::Staging;
@@ -15,6 +15,7 @@ pub(crate) struct Texture {
     image: VulkanImage,
     shape: TextureShape,
     format: SampleFormat,
+    layout: TextureLayout,
     held: HeldChunks,
 }
 
@@ -27,12 +28,12 @@ impl Texture {
         device: &Arc<Device>,
         queue: &mut Queue,
         slots: &Slots,
-        filtered: bool,
+        layout: TextureLayout,
         old: Option<Texture>,
     ) -> Result<Texture, RenderError> {
-        check_format(device, slots.format(), filtered)?;
-        let limit = device.physical().limits.max_image_dimension3_d;
-        let mut old = old.filter(|old| old.format == slots.format());
+        check_format(device, slots.format(), layout)?;
+        let limit = device.physical().capabilities().max_texels(layout);
+        let mut old = old.filter(|old| (old.format, old.layout) == (slots.format(), layout));
         if let Some(old) = old.take_if(|old| old.held.has_all(slots)) {
             return Ok(old);
         }
@@ -42,7 +43,7 @@ impl Texture {
             (Room { change: RoomChange::Grow, shape }, Some(old)) => old.grown(device, queue, shape),
             (Room { shape, .. }, old) => {
                 drop(old);
-                Texture::empty(device, queue, shape, slots.format())
+                Texture::empty(device, queue, shape, (slots.format(), layout))
             }
         }
     }
@@ -62,24 +63,24 @@ impl Texture {
         device: &Arc<Device>,
         queue: &mut Queue,
         shape: TextureShape,
-        format: SampleFormat,
+        (format, layout): (SampleFormat, TextureLayout),
     ) -> Result<Texture, RenderError> {
-        let image = VulkanImage::texture_3d(device, format, shape.texels())?;
+        let image = VulkanImage::texture(device, format, layout, shape.texels())?;
         queue.run("preparing the atlas", |recorder| {
             recorder.image_barrier(&image, Use::Nothing, Use::CopyTarget);
             recorder.clear(&image);
             recorder.image_barrier(&image, Use::CopyTarget, Use::ShaderRead);
         })?;
-        Ok(Texture { image, shape, format, held: HeldChunks::default() })
+        Ok(Texture { image, shape, format, layout, held: HeldChunks::default() })
     }
 
     /// A larger atlas with this one's bricks at their places; without them if both do not fit the device.
     fn grown(self, device: &Arc<Device>, queue: &mut Queue, shape: TextureShape) -> Result<Texture, RenderError> {
-        let larger = match Texture::empty(device, queue, shape, self.format) {
+        let kind = (self.format, self.layout);
+        let larger = match Texture::empty(device, queue, shape, kind) {
             Err(RenderError::OutOfMemory { .. }) => {
-                let format = self.format;
                 drop(self);
-                return Texture::empty(device, queue, shape, format);
+                return Texture::empty(device, queue, shape, kind);
             }
             larger => larger?,
         };
@@ -167,21 +168,24 @@ impl Texture {
     }
 }
 
-/// Checks that shaders can read a format, through a filter if they use a sampler.
-pub(crate) fn check_format(device: &Device, format: SampleFormat, filtered: bool) -> Result<(), RenderError> {
-    let what = match (format, filtered) {
-        (SampleFormat::Unorm8, false) => "read textures of 8-bit samples",
-        (SampleFormat::Unorm8, true) => "filter textures of 8-bit samples, as fast mode does",
-        (SampleFormat::Unorm8x4, false) => "read textures of four 8-bit numbers",
-        (SampleFormat::Unorm8x4, true) => "filter textures of four 8-bit numbers, as fast mode does",
-        (SampleFormat::Unorm16, false) => "read textures of 16-bit samples",
-        (SampleFormat::Unorm16, true) => "filter textures of 16-bit samples, as fast mode does",
-        (SampleFormat::Float32, false) => "read textures of 32-bit floats",
-        (SampleFormat::Float32, true) => "filter textures of 32-bit floats, as fast mode does",
+/// Checks that shaders can read a format: a volume through a filter.
+pub(crate) fn check_format(device: &Device, format: SampleFormat, layout: TextureLayout) -> Result<(), RenderError> {
+    use TextureLayout::{Layers, Volume};
+    let what = match (format, layout) {
+        (SampleFormat::Unorm8, Layers) => "read textures of 8-bit samples",
+        (SampleFormat::Unorm8, Volume) => "filter textures of 8-bit samples, as fast mode does",
+        (SampleFormat::Unorm8x4, Layers) => "read textures of four 8-bit numbers",
+        (SampleFormat::Unorm8x4, Volume) => "filter textures of four 8-bit numbers, as fast mode does",
+        (SampleFormat::Unorm16, Layers) => "read textures of 16-bit samples",
+        (SampleFormat::Unorm16, Volume) => "filter textures of 16-bit samples, as fast mode does",
+        (SampleFormat::Float32, Layers) => "read textures of 32-bit floats",
+        (SampleFormat::Float32, Volume) => "filter textures of 32-bit floats, as fast mode does",
     };
-    let needed = match filtered {
-        true => vk::FormatFeatureFlags::SAMPLED_IMAGE | vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR,
-        false => vk::FormatFeatureFlags::SAMPLED_IMAGE,
+    let needed = match layout {
+        TextureLayout::Volume => {
+            vk::FormatFeatureFlags::SAMPLED_IMAGE | vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR
+        }
+        TextureLayout::Layers => vk::FormatFeatureFlags::SAMPLED_IMAGE,
     };
     match device.format_features(vulkan_format(format)).contains(needed) {
         true => Ok(()),

@@ -3,7 +3,7 @@
 use brickfield_core::Image;
 use brickfield_core::glam::{UVec2, UVec3};
 
-use crate::{CellsBackend, FramePlan, MeshBackend};
+use crate::{CellsBackend, FramePlan, MeshBackend, TextureLayout};
 
 /// Replays frame plans, and draws meshes and curvilinear cells; decides nothing.
 ///
@@ -105,6 +105,8 @@ impl Description {
 pub struct Capabilities {
     /// Most texels along a side of a 3-D texture.
     pub max_texture_3d: u32,
+    /// Most layers of a 2-D array.
+    pub max_layers: u32,
     /// Most pixels along a side of a picture.
     pub max_image: u32,
     /// Most bytes in a buffer that a shader reads.
@@ -119,11 +121,20 @@ impl Capabilities {
     /// No limit, and filters in f32 arithmetic: renderers in main memory.
     pub const UNLIMITED: Capabilities = Capabilities {
         max_texture_3d: u32::MAX,
+        max_layers: u32::MAX,
         max_image: u32::MAX,
         max_buffer_bytes: isize::MAX as u64,
         max_storage_buffers: u32::MAX,
         sub_texel_bits: 23,
     };
+
+    /// Most texels along a side of a texture of three axes.
+    pub fn max_texels(&self, layout: TextureLayout) -> u32 {
+        match layout {
+            TextureLayout::Volume => self.max_texture_3d,
+            TextureLayout::Layers => self.max_layers.min(self.max_image),
+        }
+    }
 }
 
 /// A rendered frame.
@@ -261,9 +272,11 @@ pub enum RenderError {
     BatchSize { batch: UVec2, size: UVec2 },
     #[error("a picture of {} x {} pixels is beyond the device's limit of {limit} a side", size.x, size.y)]
     ImageTooLarge { size: UVec2, limit: u32 },
-    #[error("{n_bricks} bricks of {side}^3 samples do not fit a 3-D texture of at most {limit} texels a side")]
+    #[error(
+        "{n_bricks} bricks of {side}^3 samples do not fit a texture of at most {limit} texels along each of three axes"
+    )]
     AtlasTooLarge { n_bricks: u32, side: u32, limit: u32 },
-    #[error("a 3-D texture of {} x {} x {} texels is beyond the device's limit of {limit} a side", texels.x, texels.y, texels.z)]
+    #[error("a texture of {} x {} x {} texels is beyond the device's limit of {limit} a side", texels.x, texels.y, texels.z)]
     TextureTooLarge { texels: UVec3, limit: u32 },
     #[error("a shader with {n} storage buffers; the device allows {limit}")]
     TooManyStorageBuffers { n: u32, limit: u32 },

@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Feature {
-    /// The filter of the texture unit instead of eight loads (fast mode).
+    /// The filter of the texture unit instead of two gathers of four texels (fast mode).
     HardwareFilter,
     /// Rays end when hardly anything shines through any more (fast mode).
     EarlyTermination,

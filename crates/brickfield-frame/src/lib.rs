@@ -38,7 +38,8 @@ pub use content::{Chunk, Chunked, ContentId, HeldChunks};
 pub use feature::{Feature, FeatureSet};
 pub use field::{
     AtlasShape, BlockPlaces, BlockRanges, BlockRow, BlockSamples, Decode, Field, FieldError, IndexEntry, IndexGrid,
-    IndexLattice, Join, Packing, Places, Reach, Room, RoomChange, SampleFormat, Slots, SlotsError, TextureShape,
+    IndexLattice, Join, Packing, Places, Reach, Room, RoomChange, SampleFormat, Slots, SlotsError, TextureLayout,
+    TextureShape,
 };
 pub use lighting::{LightUniform, Lighting};
 pub use mesh::{

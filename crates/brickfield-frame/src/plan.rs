@@ -8,7 +8,7 @@ use brickfield_optics::{LightSource, Normals, QuadratureRule, SURFACE_STEEPNESS}
 
 use crate::{
     Beams, DarkRegions, Division, Feature, FeatureSet, Field, KeptBoxes, Lighting, Mode, Occupancy, Placement,
-    ProxyGeometry, RayFrame, SampleFormat, Sampling, Slices, Slots, Target, ValueScale,
+    ProxyGeometry, RayFrame, SampleFormat, Sampling, Slices, Slots, Target, TextureLayout, ValueScale,
 };
 
 /// Everything that a backend needs for one frame, and nothing that this frame does not need.
@@ -331,6 +331,14 @@ impl FramePlan {
     /// How f32 arithmetic counts data values.
     pub fn value_scale(&self) -> ValueScale {
         ValueScale::of(&self.transfer, self.field.slots().decode())
+    }
+
+    /// How a device holds the samples: a volume for the texture unit's filter, else layers.
+    pub fn texture_layout(&self) -> TextureLayout {
+        match self.features.contains(Feature::HardwareFilter) {
+            true => TextureLayout::Volume,
+            false => TextureLayout::Layers,
+        }
     }
 
     /// Whether shaders turn texture reads back into the integers that were stored: 16-bit samples where

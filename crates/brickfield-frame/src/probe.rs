@@ -4,7 +4,7 @@ use brickfield_core::glam::{DVec3, UVec2, UVec3};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-use crate::{Backend, RenderError, SampleFormat};
+use crate::{Backend, RenderError, SampleFormat, TextureLayout};
 
 /// A backend whose device reads textures, which can be measured apart from rendering.
 pub trait Probe: Backend {
@@ -20,11 +20,11 @@ pub trait Probe: Backend {
 pub enum Fetch {
     /// By the texture unit's filter, as in fast mode.
     Filtered,
-    /// By eight loads and f32 arithmetic, as in exact mode.
-    Loaded,
+    /// By two gathers of four texels and f32 arithmetic, as in exact mode.
+    Gathered,
 }
 
-/// Trilinear values at even distances on rays through a 3-D texture, added up: the reads of a march without the rest of it.
+/// Trilinear values at even distances on rays through a texture of three axes, added up: the reads of a march without the rest of it.
 ///
 /// Ray (x, y) runs through the whole depth of the texture, from 0 to 4/5 of its width and height at the front to 1/5 to 1 at
 /// the back, so that neighbours run side by side as a picture's rays do, along no axis.
@@ -63,13 +63,21 @@ pub struct ProbeUniforms {
 
 impl Fetch {
     /// Both.
-    pub const ALL: [Fetch; 2] = [Fetch::Filtered, Fetch::Loaded];
+    pub const ALL: [Fetch; 2] = [Fetch::Filtered, Fetch::Gathered];
 
     /// The name in shaders and reports.
     pub const fn name(self) -> &'static str {
         match self {
             Fetch::Filtered => "filtered",
-            Fetch::Loaded => "loaded",
+            Fetch::Gathered => "gathered",
+        }
+    }
+
+    /// How the texture is held.
+    pub const fn layout(self) -> TextureLayout {
+        match self {
+            Fetch::Filtered => TextureLayout::Volume,
+            Fetch::Gathered => TextureLayout::Layers,
         }
     }
 }
@@ -156,7 +164,7 @@ mod tests {
     const WORK: TextureWork = TextureWork {
         format: SampleFormat::Unorm8,
         texels: UVec3::new(8, 6, 10),
-        fetch: Fetch::Loaded,
+        fetch: Fetch::Gathered,
         n_rays: UVec2::new(3, 4),
         n_samples: 40,
     };

@@ -14,23 +14,25 @@ use crate::{CellsPlan, Chunked, FramePlan, FrameUniforms, KnotUniform, LightUnif
 pub enum Resource {
     /// The frame's numbers ([`FrameUniforms`](crate::FrameUniforms)).
     Frame,
-    /// The samples of all slots, a 3-D texture.
+    /// The samples of all slots: a 3-D texture; in exact mode layers, one for each z ([`TextureLayout`](crate::TextureLayout)).
     Atlas,
     /// How the atlas is filtered: linearly, clamped to the edge.
     AtlasSampler,
+    /// How texels of layers are gathered: as they are, clamped to the edge.
+    NearestSampler,
     /// The packed entries of the index.
     Index,
     /// Where each slot's samples lie, for slots of several sizes.
     Places,
     /// The level of each flat block, and where its samples lie.
     Blocks,
-    /// The spreads of flat blocks' samples, each at its sample's texel, a 3-D texture.
+    /// The spreads of flat blocks' samples, each at its sample's texel, a texture like the atlas.
     Spreads,
     /// For each flat block that is one sample, its spread.
     OneSpreads,
     /// For each flat block, its least and its greatest voxel.
     Ranges,
-    /// The gradients of flat blocks' samples, each at its sample's texel, a 3-D texture.
+    /// The gradients of flat blocks' samples, each at its sample's texel, a texture like the atlas.
     Gradients,
     /// For each flat block that is one sample, its gradient.
     OneGradients,
@@ -98,16 +100,17 @@ pub enum Content<'a> {
     Bytes(Cow<'a, [u8]>),
     /// A list that frames share: chunks that a device holds are not brought again.
     Chunks(&'a dyn Chunked),
-    /// The samples of slots as a 3-D texture: slots that a device holds are not brought again.
+    /// The samples of slots as a texture: slots that a device holds are not brought again.
     Texture(&'a Slots),
 }
 
 impl Resource {
     /// All resources.
-    pub const ALL: [Resource; 39] = [
+    pub const ALL: [Resource; 40] = [
         Resource::Frame,
         Resource::Atlas,
         Resource::AtlasSampler,
+        Resource::NearestSampler,
         Resource::Index,
         Resource::Places,
         Resource::Blocks,
@@ -152,6 +155,7 @@ impl Resource {
             Resource::Frame => "frame_block",
             Resource::Atlas => "atlas",
             Resource::AtlasSampler => "atlas_sampler",
+            Resource::NearestSampler => "nearest_sampler",
             Resource::Index => "index",
             Resource::Places => "places",
             Resource::Blocks => "blocks",
@@ -230,6 +234,7 @@ impl FramePlan {
             Resource::Facets => bytes(bytemuck::cast_slice(&self.rays.facet_planes())),
             Resource::Frame
             | Resource::AtlasSampler
+            | Resource::NearestSampler
             | Resource::Picture
             | Resource::Inputs
             | Resource::Outputs

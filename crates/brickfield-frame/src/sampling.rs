@@ -39,7 +39,7 @@ pub enum Lengths {
 /// Exact or fast; never mixed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mode {
-    /// Eight loads and f32 arithmetic per sample, no early termination.
+    /// All eight texels (two gathers) and f32 arithmetic per sample, no early termination.
     Exact,
     /// Hardware filtering; a ray ends when its transmittance falls below `transmittance_floor` (0: never), which is the
     /// most that any channel can lose.

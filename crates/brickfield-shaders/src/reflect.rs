@@ -1,6 +1,6 @@
 //! The resources that are left in a module, which a backend must bind.
 
-use brickfield_frame::Resource;
+use brickfield_frame::{Resource, TextureLayout};
 use naga::{AddressSpace, GlobalVariable, ImageClass, ImageDimension, Module, StorageAccess, StorageFormat, TypeInner};
 
 /// A resource of group 0.
@@ -19,10 +19,10 @@ pub struct Binding {
 pub enum BindingKind {
     /// A uniform buffer ([`brickfield_frame::FrameUniforms`]).
     Uniform,
-    /// A 3-D texture whose reads are f32 (the atlas); filtered if there is a [`Sampler`](Self::Sampler).
-    Texture3d,
-    /// A sampler: linear, clamped to the edge.
-    Sampler,
+    /// A texture whose reads are f32 (the atlas): a volume that is filtered, or layers that are not.
+    Texture(TextureLayout),
+    /// A sampler, clamped to the edge: linear for a volume, nearest for layers.
+    Sampler(TextureLayout),
     /// A storage buffer that is read.
     StorageRead,
     /// A storage buffer that is written.
@@ -46,8 +46,9 @@ pub(crate) fn bindings(module: &Module) -> Result<Vec<Binding>, String> {
     let bound = module.global_variables.iter().filter_map(|(_, g)| g.binding.map(|b| (b.binding, g)));
     let binding = |(index, g): (u32, &GlobalVariable)| {
         let name = g.name.as_deref().unwrap_or_default();
-        let kind = kind(g.space, &module.types[g.ty].inner);
-        match (Resource::of_name(name), kind) {
+        let resource = Resource::of_name(name);
+        let kind = resource.and_then(|resource| kind(resource, g.space, &module.types[g.ty].inner));
+        match (resource, kind) {
             (Some(resource), Some(kind)) => Ok(Binding { index, resource, kind }),
             _ => Err(name.to_owned()),
         }
@@ -57,16 +58,19 @@ pub(crate) fn bindings(module: &Module) -> Result<Vec<Binding>, String> {
     Ok(bindings)
 }
 
-fn kind(space: AddressSpace, inner: &TypeInner) -> Option<BindingKind> {
+fn kind(resource: Resource, space: AddressSpace, inner: &TypeInner) -> Option<BindingKind> {
     match (space, inner) {
         (AddressSpace::Uniform, _) => Some(BindingKind::Uniform),
         (AddressSpace::Storage { access }, _) if access.contains(StorageAccess::STORE) => {
             Some(BindingKind::StorageReadWrite)
         }
         (AddressSpace::Storage { .. }, _) => Some(BindingKind::StorageRead),
-        (AddressSpace::Handle, TypeInner::Sampler { comparison: false }) => Some(BindingKind::Sampler),
-        (AddressSpace::Handle, TypeInner::Image { dim: ImageDimension::D3, class: ImageClass::Sampled { .. }, .. }) => {
-            Some(BindingKind::Texture3d)
+        (AddressSpace::Handle, TypeInner::Sampler { comparison: false }) => match resource {
+            Resource::NearestSampler => Some(BindingKind::Sampler(TextureLayout::Layers)),
+            _ => Some(BindingKind::Sampler(TextureLayout::Volume)),
+        },
+        (AddressSpace::Handle, TypeInner::Image { dim, arrayed, class: ImageClass::Sampled { .. } }) => {
+            layout(*dim, *arrayed).map(BindingKind::Texture)
         }
         (
             AddressSpace::Handle,
@@ -76,6 +80,14 @@ fn kind(space: AddressSpace, inner: &TypeInner) -> Option<BindingKind> {
                 ..
             },
         ) => Some(BindingKind::StorageImage),
+        _ => None,
+    }
+}
+
+fn layout(dim: ImageDimension, arrayed: bool) -> Option<TextureLayout> {
+    match (dim, arrayed) {
+        (ImageDimension::D3, false) => Some(TextureLayout::Volume),
+        (ImageDimension::D2, true) => Some(TextureLayout::Layers),
         _ => None,
     }
 }

@@ -242,7 +242,7 @@ impl Entry {
             Entry::Proxy(_) => &["project", "shade"],
             Entry::Evaluate(_) => &["evaluate"],
             Entry::Probe(Fetch::Filtered) => &["filtered"],
-            Entry::Probe(Fetch::Loaded) => &["loaded"],
+            Entry::Probe(Fetch::Gathered) => &["gathered"],
             Entry::Decode => &["decode"],
             Entry::Mesh(_) => &["place", "paint"],
             Entry::Cells(_) => &["march_cells"],
@@ -346,7 +346,11 @@ impl Variant {
 
     /// The shader that reads textures one way. It has nothing of a plan's.
     pub fn probe(fetch: Fetch) -> Variant {
-        Variant::new(FeatureSet::default(), QuadratureRule::MidpointExponential, Entry::Probe(fetch))
+        let features = match fetch {
+            Fetch::Filtered => FeatureSet::default().with(Feature::HardwareFilter),
+            Fetch::Gathered => FeatureSet::default(),
+        };
+        Variant::new(features, QuadratureRule::MidpointExponential, Entry::Probe(fetch))
     }
 
     /// The shader that unpacks samples. It has nothing of a plan's.

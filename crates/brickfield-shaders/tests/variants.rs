@@ -60,6 +60,8 @@ fn variant(options: &[usize; N_OPTIONS]) -> Option<Variant> {
         && (!matches!(variant.entry, Entry::Proxy(_)) || is_drawn)
         && (variant.entry != Entry::Proxy(Slices::InteriorsFirst) || is_blended)
         && (matches!(variant.field, FieldKind::Bricks | FieldKind::Placed) || !features.contains(Feature::SkipDark))
+        && (!matches!(variant.entry, Entry::Probe(_))
+            || (variant.entry == Entry::Probe(Fetch::Filtered)) == features.contains(Feature::HardwareFilter))
         && (is_of_blocks || !features.contains(Feature::ShortBlocks))
         && (matches!(variant.field, FieldKind::Blocks(_)) || !features.contains(Feature::Prefiltered))
         && (variant.rule != QuadratureRule::PreIntegrated || !features.contains(Feature::Prefiltered))
@@ -253,12 +255,12 @@ fn what_a_scene_does_not_need_is_left_out() {
     }
     assert!(march(unlit, rule).wgsl.contains("fn later"));
     assert!(!march(unlit.without(Feature::TransferLookup), rule).wgsl.contains("fn later"));
-    assert!(!general.wgsl.contains("textureLoad") && !general.wgsl.contains("preintegrate"));
+    assert!(!general.wgsl.contains("textureGather") && !general.wgsl.contains("preintegrate"));
 }
 
 #[test]
 fn functions_bind_what_they_read() {
-    use Resource::{Atlas, FewKnots, Frame, Index, Inputs, Knots, Outputs};
+    use Resource::{Atlas, FewKnots, Frame, Index, Inputs, Knots, NearestSampler, Outputs};
     let among = |n_knots, function| {
         let features = FeatureSet::default().with(Feature::TransferLookup);
         let mut variant = Variant::new(features, QuadratureRule::Gauss2, Entry::Evaluate(function));
@@ -269,18 +271,18 @@ fn functions_bind_what_they_read() {
     assert_eq!(of(ShaderFunction::Alpha), [Inputs, Outputs]);
     assert_eq!(of(ShaderFunction::Classify), [Frame, Inputs, Outputs, FewKnots]);
     assert_eq!(among(9, ShaderFunction::Classify), [Frame, Knots, Inputs, Outputs]);
-    assert_eq!(of(ShaderFunction::Sample), [Frame, Atlas, Index, Inputs, Outputs]);
+    assert_eq!(of(ShaderFunction::Sample), [Frame, Atlas, NearestSampler, Index, Inputs, Outputs]);
     assert_eq!(of(ShaderFunction::RayAnchor), [Frame, Inputs, Outputs]);
 }
 
 #[test]
 fn a_probe_reads_one_way_and_binds_no_more() {
-    use Resource::{Atlas, AtlasSampler, Means, Probe};
+    use Resource::{Atlas, AtlasSampler, Means, NearestSampler, Probe};
     let filtered = compile(&Variant::probe(Fetch::Filtered));
     assert_eq!((resources(&filtered), filtered.workgroup_size), (vec![Probe, Atlas, AtlasSampler, Means], [8, 8, 1]));
-    assert!(!filtered.wgsl.contains("textureLoad"));
-    let loaded = compile(&Variant::probe(Fetch::Loaded));
-    assert_eq!((resources(&loaded), loaded.workgroup_size), (vec![Probe, Atlas, Means], [8, 8, 1]));
-    assert!(!loaded.wgsl.contains("textureSample"));
-    assert!([filtered, loaded].iter().all(|shader| shader.spirv().unwrap().len() > 100));
+    assert!(!filtered.wgsl.contains("textureGather"));
+    let gathered = compile(&Variant::probe(Fetch::Gathered));
+    assert_eq!((resources(&gathered), gathered.workgroup_size), (vec![Probe, Atlas, NearestSampler, Means], [8, 8, 1]));
+    assert!(!gathered.wgsl.contains("textureSample"));
+    assert!([filtered, gathered].iter().all(|shader| shader.spirv().unwrap().len() > 100));
 }

@@ -132,6 +132,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 fn capabilities(limits: &wgpu::Limits) -> Capabilities {
     let mut capabilities = Capabilities::UNLIMITED;
     capabilities.max_texture_3d = limits.max_texture_dimension_3d;
+    capabilities.max_layers = limits.max_texture_array_layers;
     capabilities.max_image = limits.max_texture_dimension_2d;
     capabilities.max_buffer_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
     capabilities.max_storage_buffers = limits.max_storage_buffers_per_shader_stage;

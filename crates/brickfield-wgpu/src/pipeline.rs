@@ -3,11 +3,12 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use brickfield_frame::{ProxyCorner, RenderError, Resource, Target};
+use brickfield_frame::{ProxyCorner, RenderError, Resource, Target, TextureLayout};
 use brickfield_shaders::{Binding, BindingKind, Entry, PipelineKey, Pipelines, ShaderLibrary, Specialised};
 
 use crate::device::Device;
 use crate::picture::{DEPTH, format};
+use crate::texture::view_dimension;
 
 /// A variant, ready to run.
 pub(crate) struct Pipeline {
@@ -46,8 +47,7 @@ fn build(device: &Device, library: &ShaderLibrary, key: &PipelineKey) -> Result<
 fn from_shader(device: &wgpu::Device, shader: Specialised, target: Target) -> Pipeline {
     let entry = shader.variant.entry;
     let label = entry.entry_points()[0];
-    let filtered = shader.bindings.iter().any(|b| b.kind == BindingKind::Sampler);
-    let entries: Vec<_> = shader.bindings.iter().map(|b| layout_entry(b, entry, filtered)).collect();
+    let entries: Vec<_> = shader.bindings.iter().map(|b| layout_entry(b, entry)).collect();
     let layout =
         device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries });
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -135,17 +135,20 @@ fn triangles(
     })
 }
 
-fn layout_entry(binding: &Binding, entry: Entry, filtered: bool) -> wgpu::BindGroupLayoutEntry {
+fn layout_entry(binding: &Binding, entry: Entry) -> wgpu::BindGroupLayoutEntry {
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
     let ty = match binding.kind {
         BindingKind::Uniform => buffer(wgpu::BufferBindingType::Uniform),
-        BindingKind::Texture3d => wgpu::BindingType::Texture {
-            sample_type: wgpu::TextureSampleType::Float { filterable: filtered },
-            view_dimension: wgpu::TextureViewDimension::D3,
+        BindingKind::Texture(layout) => wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Float { filterable: layout == TextureLayout::Volume },
+            view_dimension: view_dimension(layout),
             multisampled: false,
         },
-        BindingKind::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+        BindingKind::Sampler(TextureLayout::Volume) => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+        BindingKind::Sampler(TextureLayout::Layers) => {
+            wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering)
+        }
         BindingKind::StorageRead => storage(true),
         BindingKind::StorageReadWrite => storage(false),
         BindingKind::StorageImage => wgpu::BindingType::StorageTexture {

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use brickfield_frame::{Fetch, Probe, RenderError, Resource, SampleFormat, TextureReads, TextureWork};
+use brickfield_frame::{Fetch, Probe, RenderError, Resource, SampleFormat, TextureLayout, TextureReads, TextureWork};
 use brickfield_shaders::{Binding, PipelineKey, Variant};
 use wgpu::{BufferUsages, Features};
 
@@ -12,7 +12,7 @@ use crate::clock::{Clock, milliseconds_since};
 use crate::device::Device;
 use crate::pipeline::{Pipeline, Program};
 use crate::resources::missing;
-use crate::texture::stored_as;
+use crate::texture::{described, sampler, stored_as, whole_view};
 
 /// Most bytes of texels that are on their way at once, if a layer of the texture has no more.
 const BYTES_AT_ONCE: usize = 64 << 20;
@@ -28,7 +28,7 @@ impl Probe for WgpuBackend {
         uniforms.write(device, bytemuck::bytes_of(&work.uniforms()))?;
         means.reserve(device, u64::from(work.n_rays.element_product()) * size_of::<f32>() as u64)?;
         let pipeline = &*self.pipelines.of(PipelineKey::computing(Variant::probe(work.fetch)))?;
-        let group = bind(device, pipeline, &texture, [&uniforms, &means])?;
+        let group = bind(device, pipeline, (&texture, work.fetch.layout()), [&uniforms, &means])?;
         let (mut device_ms, mut wall_ms) = (Vec::new(), Vec::new());
         for _ in 0..n_runs {
             let begin = Instant::now();
@@ -48,16 +48,7 @@ fn noise(device: &Device, work: &TextureWork) -> Result<wgpu::Texture, RenderErr
     let (format, [x, y, z]) = (stored_as(device, work.format)?, work.texels.to_array());
     let layer_bytes = x as usize * y as usize * work.format.n_bytes();
     device.checked("a texture", layer_bytes as u64 * u64::from(z), || {
-        let texture = device.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("noise"),
-            size: wgpu::Extent3d { width: x, height: y, depth_or_array_layers: z },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D3,
-            format,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        });
+        let texture = device.device.create_texture(&described("noise", work.fetch.layout(), work.texels, format));
         let n_at_once = (BYTES_AT_ONCE / layer_bytes.max(1)).max(1) as u32;
         for first in (0..z).step_by(n_at_once as usize) {
             write_layers(device, &texture, work, first, n_at_once.min(z - first));
@@ -83,21 +74,14 @@ fn write_layers(device: &Device, texture: &wgpu::Texture, work: &TextureWork, fi
 fn bind(
     device: &Device,
     pipeline: &Pipeline,
-    texture: &wgpu::Texture,
+    (texture, layout): (&wgpu::Texture, TextureLayout),
     [uniforms, means]: [&Reused; 2],
 ) -> Result<wgpu::BindGroup, RenderError> {
-    let linear = wgpu::FilterMode::Linear;
-    let sampler = device.device.create_sampler(&wgpu::SamplerDescriptor {
-        label: Some("noise"),
-        mag_filter: linear,
-        min_filter: linear,
-        ..wgpu::SamplerDescriptor::default()
-    });
-    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+    let (sampler, view) = (sampler(&device.device, layout), whole_view(texture, layout));
     let bound = |resource| match resource {
         Resource::Probe => uniforms.binding(),
         Resource::Atlas => Some(wgpu::BindingResource::TextureView(&view)),
-        Resource::AtlasSampler => Some(wgpu::BindingResource::Sampler(&sampler)),
+        Resource::AtlasSampler | Resource::NearestSampler => Some(wgpu::BindingResource::Sampler(&sampler)),
         Resource::Means => means.binding(),
         _ => None,
     };

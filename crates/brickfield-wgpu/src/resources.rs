@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use brickfield_core::BrickSide;
 use brickfield_core::glam::UVec2;
-use brickfield_frame::{AtlasShape, Content, FramePlan, FrameUniforms, RenderError, Resource, Slots};
+use brickfield_frame::{AtlasShape, Content, FramePlan, FrameUniforms, RenderError, Resource, Slots, TextureLayout};
 use brickfield_shaders::{Binding, BindingKind, decodings};
 use wgpu::BufferUsages;
 
@@ -12,13 +12,14 @@ use crate::buffer::Reused;
 use crate::device::Device;
 use crate::picture::{Maker, Picture};
 use crate::pipeline::Pipeline;
-use crate::texture::Texture;
+use crate::texture::{Texture, sampler};
 
 /// The buffers, textures and sampler that shaders read, and the picture that they write.
 pub(crate) struct Resources {
     buffers: BTreeMap<Resource, Reused>,
     textures: BTreeMap<Resource, Texture>,
-    sampler: wgpu::Sampler,
+    linear: wgpu::Sampler,
+    nearest: wgpu::Sampler,
     pub(crate) picture: Option<Picture>,
 }
 
@@ -31,17 +32,11 @@ pub(crate) struct Brought {
 
 impl Resources {
     pub(crate) fn new(device: &Device) -> Resources {
-        let linear = wgpu::FilterMode::Linear;
-        let sampler = wgpu::SamplerDescriptor {
-            label: Some("atlas"),
-            mag_filter: linear,
-            min_filter: linear,
-            ..wgpu::SamplerDescriptor::default()
-        };
         Resources {
             buffers: BTreeMap::new(),
             textures: BTreeMap::new(),
-            sampler: device.device.create_sampler(&sampler),
+            linear: sampler(&device.device, TextureLayout::Volume),
+            nearest: sampler(&device.device, TextureLayout::Layers),
             picture: None,
         }
     }
@@ -69,7 +64,9 @@ impl Resources {
             n_bytes += match plan.content(*resource) {
                 Some(Content::Bytes(bytes)) => self.buffer(*resource).write(device, &bytes)?,
                 Some(Content::Chunks(chunks)) => self.buffer(*resource).bring(device, chunks)?,
-                Some(Content::Texture(slots)) => self.bring_slots(device, *resource, slots, decoder)?,
+                Some(Content::Texture(slots)) => {
+                    self.bring_slots(device, (*resource, plan.texture_layout()), slots, decoder)?
+                }
                 None => 0,
             };
         }
@@ -103,11 +100,11 @@ impl Resources {
     fn bring_slots(
         &mut self,
         device: &Device,
-        resource: Resource,
+        (resource, layout): (Resource, TextureLayout),
         slots: &Slots,
         decoder: Option<&Pipeline>,
     ) -> Result<u64, RenderError> {
-        let mut texture = Texture::with_room(device, slots, self.textures.remove(&resource))?;
+        let mut texture = Texture::with_room(device, slots, layout, self.textures.remove(&resource))?;
         let missing = texture.missing(slots);
         let mut n_bytes = texture.upload(device, slots, &missing)?;
         if let Some(decoder) = decoder {
@@ -156,8 +153,9 @@ impl Resources {
             BindingKind::Uniform | BindingKind::StorageRead | BindingKind::StorageReadWrite => {
                 self.buffers.get(resource)?.binding()
             }
-            BindingKind::Texture3d => Some(wgpu::BindingResource::TextureView(&self.textures.get(resource)?.view)),
-            BindingKind::Sampler => Some(wgpu::BindingResource::Sampler(&self.sampler)),
+            BindingKind::Texture(_) => Some(wgpu::BindingResource::TextureView(&self.textures.get(resource)?.view)),
+            BindingKind::Sampler(TextureLayout::Volume) => Some(wgpu::BindingResource::Sampler(&self.linear)),
+            BindingKind::Sampler(TextureLayout::Layers) => Some(wgpu::BindingResource::Sampler(&self.nearest)),
             BindingKind::StorageImage => Some(wgpu::BindingResource::TextureView(&self.picture.as_ref()?.view)),
         }
     }

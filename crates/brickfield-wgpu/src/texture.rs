@@ -1,8 +1,10 @@
-//! The samples of slots in a 3-D texture.
+//! The samples of slots in a texture of three axes.
 
 use brickfield_core::glam::UVec3;
-use brickfield_frame::{AtlasShape, HeldChunks, RenderError, Room, RoomChange, SampleFormat, Slots, TextureShape};
-use wgpu::{Features, TextureFormat};
+use brickfield_frame::{
+    AtlasShape, HeldChunks, RenderError, Room, RoomChange, SampleFormat, Slots, TextureLayout, TextureShape,
+};
+use wgpu::{Features, TextureFormat, TextureUsages};
 
 use crate::device::Device;
 
@@ -12,6 +14,7 @@ pub(crate) struct Texture {
     pub(crate) view: wgpu::TextureView,
     shape: TextureShape,
     format: SampleFormat,
+    layout: TextureLayout,
     held: HeldChunks,
 }
 
@@ -35,52 +38,50 @@ impl Texture {
     }
 
     /// A texture with room for slots: the old texture, a larger texture with the old contents, or an empty texture.
-    pub(crate) fn with_room(device: &Device, slots: &Slots, old: Option<Texture>) -> Result<Texture, RenderError> {
-        let mut old = old.filter(|old| old.format == slots.format());
+    pub(crate) fn with_room(
+        device: &Device,
+        slots: &Slots,
+        layout: TextureLayout,
+        old: Option<Texture>,
+    ) -> Result<Texture, RenderError> {
+        let mut old = old.filter(|old| (old.format, old.layout) == (slots.format(), layout));
         if let Some(old) = old.take_if(|old| old.held.has_all(slots)) {
             return Ok(old);
         }
-        let limit = device.description.capabilities.max_texture_3d;
+        let limit = device.description.capabilities.max_texels(layout);
         let room = slots.room(old.as_ref().map(|old| old.shape), limit)?;
         match (room, old) {
             (Room { change: RoomChange::Keep, .. }, Some(old)) => Ok(old),
             (Room { change: RoomChange::Grow, shape }, Some(old)) => old.grown(device, shape),
             (Room { shape, .. }, old) => {
                 drop(old);
-                Texture::empty(device, shape, slots.format())
+                Texture::empty(device, shape, (slots.format(), layout))
             }
         }
     }
 
-    fn empty(device: &Device, shape: TextureShape, format: SampleFormat) -> Result<Texture, RenderError> {
+    fn empty(
+        device: &Device,
+        shape: TextureShape,
+        (format, layout): (SampleFormat, TextureLayout),
+    ) -> Result<Texture, RenderError> {
         let texels = shape.texels();
         let n_bytes = texels.to_array().into_iter().map(u64::from).product::<u64>() * format.n_bytes() as u64;
         let stored = stored_as(device, format)?;
         device.checked("the atlas", n_bytes, || {
-            let texture = device.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("atlas"),
-                size: extent(texels),
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D3,
-                format: stored,
-                usage: wgpu::TextureUsages::TEXTURE_BINDING
-                    | wgpu::TextureUsages::COPY_DST
-                    | wgpu::TextureUsages::COPY_SRC,
-                view_formats: &[],
-            });
-            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-            Texture { texture, view, shape, format, held: HeldChunks::default() }
+            let texture = device.device.create_texture(&described("atlas", layout, texels, stored));
+            let view = whole_view(&texture, layout);
+            Texture { texture, view, shape, format, layout, held: HeldChunks::default() }
         })
     }
 
     /// A larger atlas with this one's bricks at their places; without them if both do not fit the device.
     fn grown(self, device: &Device, shape: TextureShape) -> Result<Texture, RenderError> {
-        let larger = match Texture::empty(device, shape, self.format) {
+        let kind = (self.format, self.layout);
+        let larger = match Texture::empty(device, shape, kind) {
             Err(RenderError::OutOfMemory { .. }) => {
-                let format = self.format;
                 drop(self);
-                return Texture::empty(device, shape, format);
+                return Texture::empty(device, shape, kind);
             }
             larger => larger?,
         };
@@ -145,6 +146,57 @@ impl Texture {
         };
         device.queue.write_texture(self.from(origin), bytes, layout, extent(size));
     }
+}
+
+/// A texture that copies fill and read, and shaders read.
+pub(crate) fn described(
+    label: &'static str,
+    layout: TextureLayout,
+    texels: UVec3,
+    format: TextureFormat,
+) -> wgpu::TextureDescriptor<'static> {
+    let (binding, copies) = (TextureUsages::TEXTURE_BINDING, TextureUsages::COPY_DST | TextureUsages::COPY_SRC);
+    wgpu::TextureDescriptor {
+        label: Some(label),
+        size: extent(texels),
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: match layout {
+            TextureLayout::Volume => wgpu::TextureDimension::D3,
+            TextureLayout::Layers => wgpu::TextureDimension::D2,
+        },
+        format,
+        usage: binding | copies,
+        view_formats: &[],
+    }
+}
+
+/// All texels of a texture, as shaders see them.
+pub(crate) fn whole_view(texture: &wgpu::Texture, layout: TextureLayout) -> wgpu::TextureView {
+    let dimension = Some(view_dimension(layout));
+    texture.create_view(&wgpu::TextureViewDescriptor { dimension, ..wgpu::TextureViewDescriptor::default() })
+}
+
+/// The kind of such views.
+pub(crate) fn view_dimension(layout: TextureLayout) -> wgpu::TextureViewDimension {
+    match layout {
+        TextureLayout::Volume => wgpu::TextureViewDimension::D3,
+        TextureLayout::Layers => wgpu::TextureViewDimension::D2Array,
+    }
+}
+
+/// The sampler of textures, clamped to the edge: linear for a volume; nearest for layers, of which texels are gathered as they are.
+pub(crate) fn sampler(device: &wgpu::Device, layout: TextureLayout) -> wgpu::Sampler {
+    let filter = match layout {
+        TextureLayout::Volume => wgpu::FilterMode::Linear,
+        TextureLayout::Layers => wgpu::FilterMode::Nearest,
+    };
+    device.create_sampler(&wgpu::SamplerDescriptor {
+        label: Some("atlas"),
+        mag_filter: filter,
+        min_filter: filter,
+        ..wgpu::SamplerDescriptor::default()
+    })
 }
 
 /// A size as wgpu takes it.

@@ -7,7 +7,7 @@ use brickfield_wgpu::{AdapterChoice, OpenError, WgpuBackend};
 const WORK: TextureWork = TextureWork {
     format: SampleFormat::Unorm8,
     texels: UVec3::new(37, 20, 50),
-    fetch: Fetch::Loaded,
+    fetch: Fetch::Gathered,
     n_rays: UVec2::new(13, 9),
     n_samples: 100,
 };
@@ -19,7 +19,7 @@ fn a_probe_reads_every_value_of_its_rays() {
         opened => opened.unwrap(),
     };
     for format in [SampleFormat::Unorm8, SampleFormat::Unorm16, SampleFormat::Float32] {
-        for (fetch, bound) in [(Fetch::Loaded, 1e-5), (Fetch::Filtered, 3.0 / 256.0)] {
+        for (fetch, bound) in [(Fetch::Gathered, 1e-5), (Fetch::Filtered, 3.0 / 256.0)] {
             let work = TextureWork { format, fetch, ..WORK };
             let reads = match backend.texture_reads(&work, 2) {
                 Ok(reads) => reads,

@@ -44,9 +44,14 @@ macro_rules! mutants {
 
 mutants! {
     /// The nearest sample instead of the trilinear value.
-    NEAREST: "nearest", "texels", "filtered", "let f = s - cell;" => "let f = floor(s - cell + 0.5);";
+    NEAREST: "nearest", "texels", "filtered", "all_counted(high), cell.f)" => "all_counted(high), floor(cell.f + 0.5))";
+    /// Both gathers are of one layer.
+    ONE_LAYER: "one-layer", "texels", "filtered", "textureGather(0, atlas, nearest_sampler, cell.meeting, cell.layer + 1u)"
+        => "textureGather(0, atlas, nearest_sampler, cell.meeting, cell.layer)";
+    /// Four other texels are gathered.
+    GATHERED_BESIDE: "gathered-beside", "texels", "cell_around", "(first.xy + 1.0)" => "(first.xy + 0.25)";
     /// The wrong weight along y.
-    LERP_SWAPPED: "lerp-swapped", "texels", "filtered", "return lerp(lerp(x00, x10, f.y), lerp(x01, x11, f.y), f.z);"
+    LERP_SWAPPED: "lerp-swapped", "texels", "trilinear", "return lerp(lerp(x00, x10, f.y), lerp(x01, x11, f.y), f.z);"
         => "return lerp(lerp(x00, x10, f.x), lerp(x01, x11, f.x), f.z);";
     /// Positions are not clamped to the first and last sample.
     NO_CLAMP: "no-clamp", "field/bricks", "value_at", "clamp(local(area, p), vec3f(0.0), area.last)" => "local(area, p)";
@@ -165,7 +170,7 @@ mutants! {
     ONE_SPREADS_FORGOTTEN: "one-spreads-forgotten", "field/blocks", "read_among",
         "unpack4x8unorm(one_spreads[cell_number(cell)]).x" => "0.0";
     /// The spread of the nearest sample.
-    NEAREST_SPREAD: "nearest-spread", "texels", "filtered_spread", "let f = s - cell;" => "let f = floor(s - cell + 0.5);";
+    NEAREST_SPREAD: "nearest-spread", "texels", "filtered_spread", "trilinear(low, high, cell.f)" => "trilinear(low, high, floor(cell.f + 0.5))";
     /// Spreads of hardware filters are half a texel beside.
     SPREAD_HALF_TEXEL: "spread-half-texel", "texels", "filtered_spread", "(texel + s + 0.5)" => "(texel + s)";
     /// All blocks have the range of the first.

@@ -185,7 +185,7 @@ pub struct Steady {
     pub n_samples: Option<u64>,
     /// The same, by the device's time.
     pub msamples_per_s: Option<f64>,
-    /// That over the rate at which the device reads textures of this size ([`TextureRate`]): eight loads for exact mode, the
+    /// That over the rate at which the device reads textures of this size ([`TextureRate`]): two gathers for exact mode, the
     /// filter for fast mode.
     pub of_texture_rate: Option<f64>,
 }
@@ -195,7 +195,7 @@ pub struct Steady {
 #[allow(missing_docs)]
 pub struct TextureRate {
     pub backend: String,
-    /// `filtered` or `loaded` (eight loads).
+    /// `filtered` or `gathered` (two gathers of four texels).
     pub fetch: String,
     pub bytes_per_texel: usize,
     /// Along each side.

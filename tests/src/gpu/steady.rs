@@ -314,7 +314,7 @@ fn n_samples(plan: &FramePlan) -> u64 {
 
 fn compare_with_textures(found: &mut SteadyFrames) {
     for frame in &mut found.frames {
-        let fetch = if frame.mode == "exact" { Fetch::Loaded } else { Fetch::Filtered };
+        let fetch = if frame.mode == "exact" { Fetch::Gathered } else { Fetch::Filtered };
         let rate = found.textures.iter().find(|t| {
             (t.texels, t.bytes_per_texel) == (frame.voxels, 1) && t.backend == frame.backend && t.fetch == fetch.name()
         });
@@ -385,7 +385,7 @@ mod tests {
             of_texture_rate: None,
         };
         let textures =
-            vec![rate(Fetch::Filtered, 128, 7.0), rate(Fetch::Filtered, 64, 200.0), rate(Fetch::Loaded, 64, 50.0)];
+            vec![rate(Fetch::Filtered, 128, 7.0), rate(Fetch::Filtered, 64, 200.0), rate(Fetch::Gathered, 64, 50.0)];
         let frames = vec![frame("exact", Some(25.0)), frame("fast", Some(50.0)), frame("fast", None)];
         let mut found = SteadyFrames { volumes: vec![], frames, textures };
         compare_with_textures(&mut found);

@@ -4,7 +4,7 @@ use super::report::{GpuReport, Steady};
 
 const HEADER: &str = "\
 | card, driver | date, form | backend | conformance | fast mode: RMSE, of the rule's bound | steady frame, fast / exact, ms of the device | \
-texture reads, filter / eight loads, M/s | march of them, fast / exact |
+texture reads, filter / gathers, M/s | march of them, fast / exact |
 |---|---|---|---|---|---|---|---|
 ";
 
@@ -74,7 +74,7 @@ fn textures(report: &GpuReport, backend: &str, voxels: u32) -> Option<String> {
         });
         of.map(|t| digits(t.msamples_per_s))
     };
-    Some(format!("{} / {}", rate("filtered")?, rate("loaded")?))
+    Some(format!("{} / {}", rate("filtered")?, rate("gathered")?))
 }
 
 fn shares(report: &GpuReport, backend: &str, voxels: u32) -> Option<String> {

@@ -96,7 +96,7 @@ fn rays_for(seconds_few: f64, few: u32, most: u32) -> u32 {
 /// The fault of the means of some rays, if there is one: reads that were not made have no rate.
 fn wrong(work: &TextureWork, means: &[f32], sub_texel_bits: u32) -> Option<String> {
     let bound = match work.fetch {
-        Fetch::Loaded => 1e-4,
+        Fetch::Gathered => 1e-4,
         Fetch::Filtered => 3.0 * (-f64::from(sub_texel_bits)).exp2(),
     };
     let n = work.n_rays.element_product();
@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     const READING: Reading =
-        Reading { format: SampleFormat::Unorm8, texels: 8, fetch: Fetch::Loaded, rays: 512, n_runs: 2 };
+        Reading { format: SampleFormat::Unorm8, texels: 8, fetch: Fetch::Gathered, rays: 512, n_runs: 2 };
 
     #[test]
     fn runs_are_of_reasonable_length() {

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use std::ffi::CStr;
 
 use ash::vk;
+use brickfield_frame::Capabilities;
 
 use super::Instance;
 use super::device::PipelineIdentity;
@@ -22,6 +23,20 @@ pub(crate) struct PhysicalDevice {
     pub(super) identity: PipelineIdentity,
     /// Most bytes of one allocation.
     pub(crate) max_allocation: u64,
+}
+
+impl PhysicalDevice {
+    /// The limits that plans are prepared for.
+    pub(crate) fn capabilities(&self) -> Capabilities {
+        let mut capabilities = Capabilities::UNLIMITED;
+        capabilities.max_texture_3d = self.limits.max_image_dimension3_d;
+        capabilities.max_layers = self.limits.max_image_array_layers;
+        capabilities.max_image = self.limits.max_image_dimension2_d;
+        capabilities.max_buffer_bytes = u64::from(self.limits.max_storage_buffer_range);
+        capabilities.max_storage_buffers = self.limits.max_per_stage_descriptor_storage_buffers;
+        capabilities.sub_texel_bits = self.limits.sub_texel_precision_bits;
+        capabilities
+    }
 }
 
 /// A family of queues that computes.

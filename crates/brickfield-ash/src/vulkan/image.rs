@@ -5,19 +5,19 @@ use std::sync::Arc;
 
 use ash::vk;
 use brickfield_core::glam::{UVec2, UVec3};
-use brickfield_frame::{RenderError, SampleFormat, Target};
+use brickfield_frame::{RenderError, SampleFormat, Target, TextureLayout};
 
 use super::memory::{Allocation, refused};
 use super::{Device, Residence};
 use crate::error::{FailedCall, OfCall};
 
-/// The colour aspect of an image without mip levels or layers.
+/// The colour aspect of all layers of an image without mip levels.
 pub(super) const WHOLE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
     aspect_mask: vk::ImageAspectFlags::COLOR,
     base_mip_level: 0,
     level_count: 1,
     base_array_layer: 0,
-    layer_count: 1,
+    layer_count: vk::REMAINING_ARRAY_LAYERS,
 };
 
 /// An image with its view and memory.
@@ -25,24 +25,30 @@ pub(crate) struct VulkanImage {
     pub(super) raw: vk::Image,
     pub(super) view: vk::ImageView,
     extent: UVec3,
+    layout: TextureLayout,
     device: Arc<Device>,
     /// Dropped after the image is destroyed.
     memory: Option<Allocation>,
 }
 
 impl VulkanImage {
-    /// A 3-D texture that copies fill and read, and shaders read.
-    pub(crate) fn texture_3d(
+    /// A texture of three axes that copies fill and read, and shaders read.
+    pub(crate) fn texture(
         device: &Arc<Device>,
         format: SampleFormat,
+        layout: TextureLayout,
         extent: UVec3,
     ) -> Result<VulkanImage, RenderError> {
         let n_bytes = format.n_bytes() as u64 * n_texels(extent);
         let format = vulkan_format(format);
         let copies = vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
         let usage = vk::ImageUsageFlags::SAMPLED | copies;
-        let info = vk::ImageCreateInfo::default().image_type(vk::ImageType::TYPE_3D).format(format).usage(usage);
-        VulkanImage::new(device, ("the atlas", n_bytes), vk::ImageViewType::TYPE_3D, info, extent)
+        let (image_type, view_type) = match layout {
+            TextureLayout::Volume => (vk::ImageType::TYPE_3D, vk::ImageViewType::TYPE_3D),
+            TextureLayout::Layers => (vk::ImageType::TYPE_2D, vk::ImageViewType::TYPE_2D_ARRAY),
+        };
+        let info = vk::ImageCreateInfo::default().image_type(image_type).format(format).usage(usage);
+        VulkanImage::new(device, ("the atlas", n_bytes), view_type, info, extent)
     }
 
     /// A picture of four floats a pixel that shaders write and copies read.
@@ -79,11 +85,18 @@ impl VulkanImage {
         info: vk::ImageCreateInfo<'_>,
         extent: UVec3,
     ) -> Result<VulkanImage, RenderError> {
-        let info = info.extent(extent_3d(extent)).mip_levels(1).array_layers(1).samples(vk::SampleCountFlags::TYPE_1);
+        let layout = match view_type {
+            vk::ImageViewType::TYPE_2D_ARRAY => TextureLayout::Layers,
+            _ => TextureLayout::Volume,
+        };
+        let (axes, layers) = axes_and_layers(layout, extent);
+        let info =
+            info.extent(extent_3d(axes)).mip_levels(1).array_layers(layers).samples(vk::SampleCountFlags::TYPE_1);
         // SAFETY: callers keep the extent within the device's limits and the format within its features.
         let raw = unsafe { device.raw().create_image(&info, None) }
             .map_err(|code| refused("vkCreateImage", code, what, n_bytes, None))?;
-        let mut image = VulkanImage { raw, view: vk::ImageView::null(), extent, device: device.clone(), memory: None };
+        let mut image =
+            VulkanImage { raw, view: vk::ImageView::null(), extent, layout, device: device.clone(), memory: None };
         // SAFETY: the image is new.
         let required = unsafe { device.raw().get_image_memory_requirements(raw) };
         let memory = image.memory.insert(Allocation::new(device, what, required, Residence::Device)?);
@@ -99,9 +112,26 @@ impl VulkanImage {
         Ok(image)
     }
 
-    /// Its size in texels.
+    /// Its size in texels, layers along z.
     pub(crate) fn extent(&self) -> UVec3 {
         self.extent
+    }
+
+    /// A box of its texels, as copies name it: layers, offset, extent.
+    pub(super) fn part(
+        &self,
+        origin: UVec3,
+        extent: UVec3,
+    ) -> (vk::ImageSubresourceLayers, vk::Offset3D, vk::Extent3D) {
+        let (axes, layer_count) = axes_and_layers(self.layout, extent);
+        let (first, base_array_layer) = match self.layout {
+            TextureLayout::Volume => (origin, 0),
+            TextureLayout::Layers => (origin.with_z(0), origin.z),
+        };
+        let aspect_mask = vk::ImageAspectFlags::COLOR;
+        let layers = vk::ImageSubresourceLayers { aspect_mask, mip_level: 0, base_array_layer, layer_count };
+        let offset = vk::Offset3D { x: first.x as i32, y: first.y as i32, z: first.z as i32 };
+        (layers, offset, extent_3d(axes))
     }
 }
 
@@ -115,19 +145,23 @@ impl Drop for VulkanImage {
     }
 }
 
-/// A sampler: linear, clamped to the edge.
+/// A sampler, clamped to the edge.
 pub(crate) struct Sampler {
     pub(super) raw: vk::Sampler,
     device: Arc<Device>,
 }
 
 impl Sampler {
-    /// The sampler of the atlas.
-    pub(crate) fn linear(device: &Arc<Device>) -> Result<Sampler, FailedCall> {
+    /// The sampler of textures: linear for a volume; nearest for layers, of which texels are gathered as they are.
+    pub(crate) fn of(layout: TextureLayout, device: &Arc<Device>) -> Result<Sampler, FailedCall> {
+        let filter = match layout {
+            TextureLayout::Volume => vk::Filter::LINEAR,
+            TextureLayout::Layers => vk::Filter::NEAREST,
+        };
         let edge = vk::SamplerAddressMode::CLAMP_TO_EDGE;
         let info = vk::SamplerCreateInfo::default()
-            .mag_filter(vk::Filter::LINEAR)
-            .min_filter(vk::Filter::LINEAR)
+            .mag_filter(filter)
+            .min_filter(filter)
             .mipmap_mode(vk::SamplerMipmapMode::NEAREST)
             .address_mode_u(edge)
             .address_mode_v(edge)
@@ -142,6 +176,14 @@ impl Drop for Sampler {
     fn drop(&mut self) {
         // SAFETY: the device is idle, and nothing else names the sampler.
         unsafe { self.device.raw().destroy_sampler(self.raw, None) };
+    }
+}
+
+/// The axes of an image of so many texels, and its layers.
+fn axes_and_layers(layout: TextureLayout, extent: UVec3) -> (UVec3, u32) {
+    match layout {
+        TextureLayout::Volume => (extent, 1),
+        TextureLayout::Layers => (extent.with_z(1), extent.z),
     }
 }
 
@@ -192,7 +234,9 @@ mod tests {
         let limit = physical.limits.max_image_dimension3_d;
         let device = Device::new(instance, physical).unwrap();
         let least = 4 * u64::from(limit).pow(3);
-        match VulkanImage::texture_3d(&device, SampleFormat::Float32, UVec3::splat(limit)).map(|_| ()) {
+        match VulkanImage::texture(&device, SampleFormat::Float32, TextureLayout::Volume, UVec3::splat(limit))
+            .map(|_| ())
+        {
             Err(RenderError::OutOfMemory { n_bytes, .. } | RenderError::BufferTooLarge { n_bytes, .. }) => {
                 assert!(n_bytes >= least, "{n_bytes} of {least}");
             }

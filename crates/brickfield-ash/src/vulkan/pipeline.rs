@@ -112,8 +112,8 @@ impl Pipeline {
                 BindingKind::Uniform | BindingKind::StorageRead | BindingKind::StorageReadWrite,
                 Bindable::Buffer { .. },
             ) => write.buffer_info(&buffers),
-            (BindingKind::Texture3d, Bindable::Texture(_))
-            | (BindingKind::Sampler, Bindable::Sampler(_))
+            (BindingKind::Texture(_), Bindable::Texture(_))
+            | (BindingKind::Sampler(_), Bindable::Sampler(_))
             | (BindingKind::StorageImage, Bindable::Picture(_)) => write.image_info(&images),
             _ => {
                 return Err(RenderError::Shader {
@@ -324,8 +324,8 @@ impl BoundPipeline<'_> {
 fn descriptor_type(kind: BindingKind) -> vk::DescriptorType {
     match kind {
         BindingKind::Uniform => vk::DescriptorType::UNIFORM_BUFFER,
-        BindingKind::Texture3d => vk::DescriptorType::SAMPLED_IMAGE,
-        BindingKind::Sampler => vk::DescriptorType::SAMPLER,
+        BindingKind::Texture(_) => vk::DescriptorType::SAMPLED_IMAGE,
+        BindingKind::Sampler(_) => vk::DescriptorType::SAMPLER,
         BindingKind::StorageRead | BindingKind::StorageReadWrite => vk::DescriptorType::STORAGE_BUFFER,
         BindingKind::StorageImage => vk::DescriptorType::STORAGE_IMAGE,
     }

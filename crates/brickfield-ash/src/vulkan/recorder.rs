@@ -8,7 +8,7 @@ use ash::vk;
 use brickfield_core::glam::UVec3;
 use brickfield_shaders::DecodedTexels;
 
-use super::image::{WHOLE, extent_3d};
+use super::image::WHOLE;
 use super::{BoundPipeline, Buffer, Canvas, HostBuffer, VulkanImage};
 
 /// Records commands; their objects are borrowed for `'a`.
@@ -124,13 +124,8 @@ impl<'q, 'a> Recorder<'q, 'a> {
     /// Copies all texels of a [`Use::CopySource`] to the same place in a [`Use::CopyTarget`] that is as large or larger.
     pub(crate) fn copy_image(&mut self, from: &'a VulkanImage, to: &'a VulkanImage) {
         assert!(from.extent().cmple(to.extent()).all(), "a copy past the end of an image");
-        let layers = vk::ImageSubresourceLayers {
-            aspect_mask: vk::ImageAspectFlags::COLOR,
-            layer_count: 1,
-            ..Default::default()
-        };
-        let region =
-            vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(extent_3d(from.extent()));
+        let (layers, _, extent) = from.part(UVec3::ZERO, from.extent());
+        let region = vk::ImageCopy::default().src_subresource(layers).dst_subresource(layers).extent(extent);
         let (source, target) = (Use::CopySource.layout(), Use::CopyTarget.layout());
         // SAFETY: all of the source is inside the target (asserted), both outlive the run, are of one format and allow copies.
         unsafe { self.device.cmd_copy_image(self.commands, from.raw, source, to.raw, target, &[region]) };
@@ -259,16 +254,13 @@ fn regions(buffer: &Buffer, image: &VulkanImage, texel_bytes: u64, boxes: &[Imag
     let region = |b: &ImageBox| {
         assert!(b.buffer_offset + b.n_bytes(texel_bytes) <= buffer.n_bytes(), "a copy past the end of a buffer");
         assert!((b.origin + b.extent).cmple(image.extent()).all(), "a copy past the end of an image");
+        let (layers, offset, extent) = image.part(b.origin, b.extent);
         vk::BufferImageCopy::default()
             .buffer_offset(b.buffer_offset)
             .buffer_row_length(b.row_bytes.map_or(0, |row| row / texel_bytes as u32))
-            .image_subresource(vk::ImageSubresourceLayers {
-                aspect_mask: vk::ImageAspectFlags::COLOR,
-                layer_count: 1,
-                ..Default::default()
-            })
-            .image_offset(vk::Offset3D { x: b.origin.x as i32, y: b.origin.y as i32, z: b.origin.z as i32 })
-            .image_extent(extent_3d(b.extent))
+            .image_subresource(layers)
+            .image_offset(offset)
+            .image_extent(extent)
     };
     boxes.iter().map(region).collect()
 }

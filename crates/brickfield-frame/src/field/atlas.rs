@@ -62,7 +62,16 @@ impl AtlasShape {
     }
 }
 
-/// How slots lie in a 3-D texture.
+/// How a device holds a texture of three axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum TextureLayout {
+    /// A 3-D texture: the texture unit filters along all three axes (fast mode).
+    Volume,
+    /// A 2-D array with a layer for each z: four neighbours of a layer are read at once, as they are (exact mode).
+    Layers,
+}
+
+/// How slots lie in a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TextureShape {
     /// Bricks of one size, by arithmetic.

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Aabb, BlockLayout, Companion, Interblock, Level, Place};
 
-pub use atlas::{AtlasShape, Room, RoomChange, TextureShape};
+pub use atlas::{AtlasShape, Room, RoomChange, TextureLayout, TextureShape};
 pub use blocks::{BlockPlaces, BlockRanges, BlockRow, BlockSamples};
 pub use index::{IndexEntry, IndexGrid, IndexLattice, Reach};
 pub use packing::Packing;

@@ -258,6 +258,8 @@ fn samples() -> Vec<Case> {
                 BytesSwapped,
                 shader::NEAREST,
                 shader::LERP_SWAPPED,
+                shader::ONE_LAYER,
+                shader::GATHERED_BESIDE,
                 shader::NO_CLAMP,
                 shader::INDEX_STRIDE,
                 shader::ATLAS_ROW
