@@ -122,34 +122,26 @@ fn neighbours<const L: usize>(
     length: f32,
     state: &mut Ray32,
 ) {
-    let (mut place, mut depth) = ([0f32; L], [0f32; L]);
-    let begin = |i: usize| if i == *stretches.start() { f32::NEG_INFINITY } else { transfer.end(i - 1) };
+    // Red, green, blue, extinction.
+    let mut optics = [[0f32; L]; 4];
     for i in stretches.clone() {
         let stretch = transfer.linear(i);
         // Those beyond it are overwritten by its successor.
-        let begin = begin(i);
+        let begin = if i == *stretches.start() { f32::NEG_INFINITY } else { transfer.end(i - 1) };
+        let (mut place, mut is_there) = ([0f32; L], [0u32; L]);
         for l in 0..L {
-            let there = stretch.place(values[l]);
-            let thick = stretch.extinction(there) * length;
-            let is_there = mask(values[l] >= begin);
-            place[l] = either(is_there, there, place[l]);
-            depth[l] = either(is_there, thick, depth[l]);
+            place[l] = stretch.place(values[l]);
+            is_there[l] = mask(values[l] >= begin);
+        }
+        for (channel, optics) in optics.iter_mut().enumerate() {
+            for l in 0..L {
+                optics[l] = either(is_there[l], stretch.channel(channel, place[l]), optics[l]);
+            }
         }
     }
-    let weight = weights(rule, depth, n, state);
-    let mut sum = [0f32; 4];
-    for i in stretches.clone() {
-        let (begin, end) = (begin(i), transfer.end(i));
-        let mut own = [0f32; L];
-        for l in 0..L {
-            own[l] = either(mask((values[l] >= begin) & (values[l] < end)), weight[l], 0.0);
-        }
-        let (low, high) = sums(&own, &place);
-        for (sum, x) in sum.iter_mut().zip(transfer.linear(i).rgba(low, high)) {
-            *sum += x;
-        }
-    }
-    add(state, sum);
+    let [red, green, blue, extinction] = optics;
+    let weight = weights(rule, extinction.map(|x| x * length), n, state);
+    add(state, [sum(&weight, &red), sum(&weight, &green), sum(&weight, &blue), sum(&weight, &[1.0; L])]);
 }
 
 /// All bits of a word, or none: the compiler makes vectors of it, where it makes branches of `if`.
@@ -232,6 +224,16 @@ fn sums<const L: usize>(weight: &[f32; L], place: &[f32; L]) -> (f32, f32) {
         high[l % 8] += weight[l] * place[l];
     }
     (total(low), total(high))
+}
+
+/// Sum of weight x.
+#[inline(always)]
+fn sum<const L: usize>(weight: &[f32; L], x: &[f32; L]) -> f32 {
+    let mut sum = [0f32; 8];
+    for l in 0..L {
+        sum[l % 8] += weight[l] * x[l];
+    }
+    total(sum)
 }
 
 #[inline(always)]

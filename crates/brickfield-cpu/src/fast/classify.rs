@@ -119,7 +119,13 @@ impl Stretch {
     /// Extinction at a place.
     #[inline(always)]
     pub(crate) fn extinction(&self, place: f32) -> f32 {
-        self.low[3] * (1.0 - place) + self.high[3] * place
+        self.channel(3, place)
+    }
+
+    /// Red, green, blue or extinction at a place.
+    #[inline(always)]
+    pub(crate) fn channel(&self, i: usize, place: f32) -> f32 {
+        self.low[i] * (1.0 - place) + self.high[i] * place
     }
 
     /// The ends' colours with the given weights, and the weights' sum.

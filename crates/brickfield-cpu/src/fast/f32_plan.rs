@@ -122,23 +122,6 @@ impl<'a, const N: usize, S: Stored> F32Plan<'a, N, S> {
         values
     }
 
-    /// The values at the first `n` of some nodes, the last of them in the lanes behind.
-    #[inline(always)]
-    pub(super) fn first_values<const L: usize>(
-        &self,
-        nodes: &Nodes,
-        brick: &[u8],
-        at: &[f32; L],
-        n: usize,
-    ) -> [f32; L] {
-        let mut values = self.values(nodes, brick, at);
-        if n < L {
-            let last = values[n - 1];
-            values[n..].fill(last);
-        }
-        values
-    }
-
     /// The bytes of the brick in a slot.
     #[inline(always)]
     pub(super) fn brick(&self, slot: u32) -> &'a [u8] {

@@ -6,12 +6,12 @@ use brickfield_core::glam::DVec3;
 use brickfield_core::{Level, Span};
 use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, PlanRay, Sampling};
 
-use super::batch::Batch;
-use super::brick::{LANES, Nodes, Stored};
+use super::brick::{LANES, Lanes, Nodes, Stored};
 use super::classify::Classifier;
 use super::detail::Sieve;
 use super::f32_plan::{Block, F32Plan};
 use super::segment::{Ray32, Segment32, segment};
+use super::waiting::Waiting;
 use crate::blocks::Blocks;
 
 /// The segments of a ray's span: first..end, the first and the last of them cut to the span.
@@ -116,19 +116,21 @@ fn along<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, path: &Path, runs: &
     let nodes = plan32.plan.sampling().rule().nodes();
     let (near, far) = (nodes[0], nodes[nodes.len() - 1]);
     let floor = plan32.plan.sampling().transmittance_floor();
+    let mut waiting = Waiting::new(state, path.length);
     for segments in runs {
         let (mut k, to) = (path.first.max(segments.start), path.end.min(segments.end));
         while k < to {
-            let n = if path.is_whole(k) { run(plan32, path, k, (near, far), to, state) } else { 0 };
+            let n = if path.is_whole(k) { run(plan32, path, k, (near, far), to, &mut waiting) } else { 0 };
             if n == 0 {
-                state.push(single(plan32, path, k));
+                waiting.push(plan32, single(plan32, path, k));
             }
             k += n.max(1);
-            if state.has_ended(floor) {
+            if waiting.ray.has_ended(floor) {
                 return;
             }
         }
     }
+    waiting.push_all(plan32);
 }
 
 /// The segments of each brick.
@@ -143,15 +145,16 @@ fn brick_by_brick<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, ray: &PlanR
         let path = Path::new(plan32.plan.sampling(), ray, crossing.span, level);
         let block = plan32.block_of(crossing.cell);
         let resident = Resident { block: &block, slot, level };
-        state.push(single_in(plan32, &path, &block, path.first));
-        let mut k = path.first + 1;
+        let (mut k, mut waiting) = (path.first + 1, Waiting::new(state, path.length));
+        waiting.push(plan32, single_in(plan32, &path, &block, path.first));
         while k < path.end - 1 {
             let n = (path.end - 1 - k).min(MOST);
-            resident.run(plan32, &path, k, nodes, n as i32, state);
+            resident.run(plan32, &path, k, nodes, n as i32, &mut waiting);
             k += n;
         }
+        waiting.push_all(plan32);
         if path.end - 1 > path.first {
-            state.push(single_in(plan32, &path, &block, path.end - 1));
+            waiting.push(plan32, single_in(plan32, &path, &block, path.end - 1));
         }
         if state.has_ended(floor) {
             return;
@@ -201,14 +204,14 @@ fn run<const N: usize, S: Stored>(
     k: i64,
     (near, far): (f64, f64),
     to: i64,
-    state: &mut Ray32,
+    waiting: &mut Waiting,
 ) -> i64 {
     let t = (k as f64 + near) * path.step;
     let block = plan32.block(plan32.center + path.ray.at(t));
     let exit = exit(path, plan32.center, (block.low, block.high));
     let n = ((exit * path.per_unit - far).ceil() - k as f64).min((to.min(path.end - 1) - k).min(MOST) as f64) as i32;
     if let (IndexEntry::Resident { slot, reach }, true) = (block.entry, n > 0) {
-        Resident { block: &block, slot, level: reach.level_of_brick() }.run(plan32, path, k, (near, far), n, state);
+        Resident { block: &block, slot, level: reach.level_of_brick() }.run(plan32, path, k, (near, far), n, waiting);
     }
     // Rounding may have put the node into a block that the ray has left already.
     i64::from(n.max(0))
@@ -231,7 +234,7 @@ impl Resident<'_> {
         k: i64,
         (near, far): (f64, f64),
         n: i32,
-        state: &mut Ray32,
+        waiting: &mut Waiting,
     ) {
         let t = (k as f64 + near) * path.step;
         let scale = 1.0 / f64::from(self.level.stride());
@@ -245,12 +248,13 @@ impl Resident<'_> {
         };
         let far = (far - near) as f32;
         let brick = plan32.brick(self.slot);
-        let mut inner = Inner { brick, nodes, far, length: path.length, waiting: [0; 2 * LANES] };
-        match plan32.plan.occupancy() {
+        let inner = Inner { brick, nodes, far };
+        match plan32.plan.occupancy().filter(|occupancy| !occupancy.is_visible_throughout(self.slot)) {
             Some(occupancy) => {
-                inner.push_visible(plan32, &Sieve::<N>::new(nodes, far, occupancy.brick(self.slot)), n, state);
+                let sieve = Sieve::<N>::new(nodes, far, occupancy.brick(self.slot));
+                inner.push_visible(plan32, &sieve, n, waiting);
             }
-            None => inner.push_all(plan32, n, state),
+            None => inner.push_all(plan32, n, waiting),
         }
     }
 }
@@ -270,93 +274,82 @@ pub(super) fn exit(path: &Path, center: DVec3, (low, high): (DVec3, DVec3)) -> f
     exit + path.ray.t_anchor
 }
 
-/// The segments of a ray inside one brick, and which of them wait to be looked at together.
+/// The segments of a ray inside one brick.
 struct Inner<'a> {
     brick: &'a [u8],
     /// The segments' first nodes.
     nodes: Nodes,
     /// Distance between the rule's nodes, in segments.
     far: f32,
-    /// The length that a segment's light is computed for.
-    length: f32,
-    /// Segments that wait.
-    waiting: [i32; 2 * LANES],
 }
 
 impl Inner<'_> {
     /// Segments `0..n`, one after the other.
     #[inline(always)]
-    fn push_all<const N: usize, S: Stored>(&mut self, plan32: &F32Plan<N, S>, n: i32, state: &mut Ray32) {
+    fn push_all<const N: usize, S: Stored>(&self, plan32: &F32Plan<N, S>, n: i32, waiting: &mut Waiting) {
         for first in (0..n).step_by(LANES) {
-            for (l, k) in self.waiting.iter_mut().enumerate() {
-                *k = first + l as i32;
-            }
-            self.look(plan32, ((n - first) as usize).min(LANES), state);
-            if state.transmittance < plan32.plan.sampling().transmittance_floor() {
+            let at = std::array::from_fn(|l| (first + l as i32) as f32);
+            self.look(plan32, &at, ((n - first) as usize).min(LANES), waiting);
+            if waiting.ray.transmittance < plan32.plan.sampling().transmittance_floor() {
                 return;
             }
         }
     }
 
-    /// Those of segments `0..n` that may see something. They wait until they are a batch.
+    /// Those of segments `0..n` that may see something.
     #[inline(always)]
     fn push_visible<const N: usize, S: Stored>(
-        &mut self,
+        &self,
         plan32: &F32Plan<N, S>,
         sieve: &Sieve<N>,
         n: i32,
-        state: &mut Ray32,
+        waiting: &mut Waiting,
     ) {
+        // Room for less than a batch, and those of another one.
+        let (mut visible, mut n_visible) = ([0f32; 3 * LANES], 0);
         let mut first = 0;
-        let mut n_waiting = 0;
         while first < n {
-            let (mut visible, next) = sieve.batch(first);
-            if n - first < LANES as i32 {
-                visible &= (1 << (n - first)) - 1;
-            }
-            while visible != 0 {
-                self.waiting[n_waiting % (2 * LANES)] = first + visible.trailing_zeros() as i32;
-                n_waiting += 1;
-                visible &= visible - 1;
-            }
-            if n_waiting >= LANES {
-                self.look(plan32, LANES, state);
-                if state.transmittance < plan32.plan.sampling().transmittance_floor() {
+            let (n_found, next) = sieve.find(first..n, &mut visible[n_visible..]);
+            n_visible += n_found;
+            if n_visible >= LANES {
+                self.look(plan32, &std::array::from_fn(|l| visible[l]), LANES, waiting);
+                if waiting.ray.transmittance < plan32.plan.sampling().transmittance_floor() {
                     return;
                 }
-                n_waiting -= LANES;
-                self.waiting.copy_within(LANES.., 0);
+                n_visible -= LANES;
+                visible.copy_within(LANES..2 * LANES, 0);
             }
             first = next;
         }
-        if n_waiting > 0 {
-            self.look(plan32, n_waiting, state);
+        if n_visible > 0 {
+            self.look(plan32, &std::array::from_fn(|l| visible[l]), n_visible, waiting);
         }
     }
 
-    /// Puts the first `n` segments that wait behind what has been seen so far. Few take half a batch.
+    /// Lets the first `n` of some segments wait behind those before them. Few take half a batch.
     #[inline(always)]
-    fn look<const N: usize, S: Stored>(&self, plan32: &F32Plan<N, S>, n: usize, state: &mut Ray32) {
+    fn look<const N: usize, S: Stored>(&self, plan32: &F32Plan<N, S>, at: &Lanes, n: usize, waiting: &mut Waiting) {
         match n <= LANES / 2 {
-            true => self.look_at::<N, S, { LANES / 2 }>(plan32, n, state),
-            false => self.look_at::<N, S, LANES>(plan32, n, state),
+            true => self.look_at::<N, S, { LANES / 2 }>(plan32, std::array::from_fn(|l| at[l]), n, waiting),
+            false => self.look_at::<N, S, LANES>(plan32, *at, n, waiting),
         }
+        waiting.push_batch(plan32);
     }
 
     #[inline(always)]
-    fn look_at<const N: usize, S: Stored, const L: usize>(&self, plan32: &F32Plan<N, S>, n: usize, state: &mut Ray32) {
-        let mut at = [0f32; L];
-        for (at, k) in at.iter_mut().zip(&self.waiting) {
-            *at = *k as f32;
-        }
-        let rule = plan32.plan.sampling().rule();
-        let near = plan32.first_values(&self.nodes, self.brick, &at, n);
-        let far = (rule.nodes().len() > 1).then(|| {
+    fn look_at<const N: usize, S: Stored, const L: usize>(
+        &self,
+        plan32: &F32Plan<N, S>,
+        mut at: [f32; L],
+        n: usize,
+        waiting: &mut Waiting,
+    ) {
+        let near = plan32.values(&self.nodes, self.brick, &at);
+        let far = (plan32.plan.sampling().rule().nodes().len() > 1).then(|| {
             at.iter_mut().for_each(|at| *at += self.far);
-            plan32.first_values(&self.nodes, self.brick, &at, n)
+            plan32.values(&self.nodes, self.brick, &at)
         });
-        let (transfer, length) = (&plan32.transfer, self.length);
-        Batch { rule, transfer, near: &near, far: far.as_ref(), n, length }.push(plan32.simd, state);
+        waiting.add(&near, far.as_ref(), n);
     }
 }
 

@@ -12,6 +12,7 @@ mod prefiltered;
 mod scalar;
 pub(crate) mod segment;
 mod single;
+mod waiting;
 
 use std::ops::Range;
 use std::time::Instant;

@@ -87,6 +87,15 @@ impl Occupancy {
         self.bricks.get(slot as usize).is_some_and(Option::is_some)
     }
 
+    /// Whether all macrocells of the brick in a slot, which has distances, are visible.
+    ///
+    /// # Panics
+    /// If the slot has none.
+    #[inline]
+    pub fn is_visible_throughout(&self, slot: u32) -> bool {
+        is_all_visible(self.side, self.brick(slot))
+    }
+
     /// The distances of one brick's macrocells, x fastest.
     ///
     /// # Panics
