@@ -18,6 +18,8 @@
 //!
 //! `--first` measures something else: from a file to the first picture, by a new process each time.
 
+mod answers;
+mod descent;
 mod first;
 mod lineup;
 mod measure;
@@ -45,7 +47,7 @@ use crate::report::{Machine, commit};
 
 pub use first::{FirstPicture, FirstReport};
 pub use lineup::Peer;
-pub use measure::{ContestantInfo, Measured, SceneReport, StepReport};
+pub use measure::{ContestantInfo, Measured, Probe, SceneReport, StepReport};
 pub use protocol::{Domain, Part};
 pub use scenes::Generated;
 pub use standing::{Reached, TimeRatio, TimeToError};
@@ -89,6 +91,10 @@ pub struct PeersArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::step, default_value = "1/4,1/2,1,2",
           default_value_if("first", "true", "1/2"))]
     pub steps: Vec<f64>,
+    /// Go on to smaller steps, halved down to 1/64: one picture of each contestant that has not reached an error of 1e-4 and
+    /// whose error still falls; where it reaches 1e-3 or 1e-4, the step is measured
+    #[arg(long, conflicts_with = "first")]
+    pub to_error: bool,
     /// Modes of Brickfield
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::mode, default_value = "fast,exact")]
     pub modes: Vec<Mode>,
@@ -109,6 +115,10 @@ pub struct PeersArgs {
     /// Measure the way from a file to the first picture instead, by a new process each time
     #[arg(long)]
     pub first: bool,
+    /// How long the answer of a contestant may take, to read a volume or to draw a frame; one that takes longer is killed, and
+    /// the others go on
+    #[arg(long, value_name = "SECONDS", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    pub patience: u64,
     /// Folder that receives peers.json, and for each scene a page with its pictures
     #[arg(long, value_name = "DIR", default_value = "target/compare-peers")]
     pub out: PathBuf,
@@ -177,8 +187,6 @@ pub enum PeersError {
     Install { what: String, reason: String },
     #[error("{}: {source}", path.display())]
     Out { path: PathBuf, source: io::Error },
-    #[error("{contestant}: its picture: {reason}")]
-    Picture { contestant: String, reason: String },
     #[error("the streams of requests: {0}")]
     Serve(io::Error),
 }

@@ -5,8 +5,9 @@ use std::time::Instant;
 use brickfield::core::Image;
 use brickfield::core::glam::UVec2;
 
+use super::answers::ACCURACY;
 use super::lineup::{Build, Who};
-use super::measure::{ACCURACY, ContestantInfo, Frames, Measured, SceneReport, StepReport};
+use super::measure::{ContestantInfo, Frames, Measured, SceneReport, StepReport};
 use super::process::Contestant;
 use super::protocol::Domain;
 use super::scenes::Subject;
@@ -167,7 +168,7 @@ fn backends(contestants: &[ContestantInfo]) -> Vec<BackendInfo> {
 
 /// The steps of contestants that failed.
 fn left_out(scene: &SceneReport) -> Vec<LeftOut> {
-    let failed = scene.contestants.iter().filter(|c| c.domain.is_some());
+    let failed = scene.contestants.iter().filter(|c| c.domain.is_some() && c.absent.is_some());
     let of = |c: &ContestantInfo| {
         let (mode, rule) = curve(c.who);
         let reason = c.absent.clone().unwrap_or_default();

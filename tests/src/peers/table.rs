@@ -4,10 +4,11 @@ use std::fmt::Write;
 
 use comfy_table::{CellAlignment, Table, presets::NOTHING};
 
+use super::descent::LEAST_STEP;
 use super::first::FirstReport;
-use super::measure::{ContestantInfo, Measured, SceneReport, StepReport};
+use super::measure::{ContestantInfo, Measured, Probe, SceneReport, StepReport};
 use super::protocol::Domain;
-use super::standing::{BOUNDS, TimeRatio};
+use super::standing::{BOUNDS, Reached, TimeRatio};
 use crate::report::step_label;
 use crate::turns::Spread;
 
@@ -52,7 +53,20 @@ pub(super) fn times_to_errors(scene: &SceneReport) -> String {
         let reached = times.iter().map(|time| time.reached.to_string());
         lines.add_row(std::iter::once(times[0].contestant.clone()).chain(reached));
     }
-    format!("{}: the cheapest step that reaches an error\n{lines}\n", scene.name)
+    let is_open = scene.times_to_errors.iter().any(|t| is_open(&t.reached));
+    let hint = if is_open { "note: --to-error goes on to smaller steps where the error may fall\n" } else { "" };
+    format!("{}: the cheapest step that reaches an error\n{lines}\n{hint}", scene.name)
+}
+
+/// Whether smaller steps may reach an error.
+fn is_open(reached: &Reached) -> bool {
+    matches!(reached, Reached::NotYet { step_voxels, .. } if 0.5 * step_voxels >= LEAST_STEP)
+}
+
+/// The errors of pictures that were drawn once.
+pub(super) fn probes<'a>(scene: &str, step_voxels: f64, probes: impl Iterator<Item = &'a Probe>) -> String {
+    let found: Vec<String> = probes.map(|p| format!("{} {:.3}", p.contestant, 1e3 * p.rmse)).collect();
+    format!("{scene}, step {}: RMSE x 1e3 of one picture: {}\n", step_label(step_voxels), found.join(", "))
 }
 
 /// From a file to the first picture.
@@ -120,21 +134,15 @@ fn range(spread: &Spread) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::peers::standing::tests::row as measured;
-    use crate::peers::standing::times_to_errors as of_steps;
+    use crate::peers::standing::tests::{row as measured, scene};
+    use crate::peers::standing::times_to_errors as of_scene;
 
     #[test]
     fn peers_tables_have_a_line_for_each_contestant() {
         let rows = vec![measured("cpu fast", 0.5, 20.0, 1.84e-4), measured("pygfx", 0.5, 40.0, 1.646e-3)];
-        let report = StepReport { step_voxels: 0.5, rows, ratios: Vec::new() };
-        let scene = SceneReport {
-            name: "blobs-256".to_owned(),
-            dims: [256; 3],
-            scalar: "u8".to_owned(),
-            contestants: Vec::new(),
-            times_to_errors: of_steps(std::slice::from_ref(&report)),
-            steps: Vec::new(),
-        };
+        let mut scene = scene(&["cpu fast", "pygfx"], vec![rows]);
+        scene.times_to_errors = of_scene(&scene);
+        let report = scene.steps[0].clone();
         let text = step(&scene, &report);
         let words = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
         let lines: Vec<String> = text.lines().map(words).collect();
@@ -143,7 +151,11 @@ mod tests {
         assert!(lines[3].starts_with("pygfx 20.0") && lines[3].ends_with("1.646 0.0165"), "{text}");
         let text = times_to_errors(&scene);
         let lines: Vec<String> = text.lines().map(words).collect();
-        assert_eq!(lines[2], "cpu fast step 1/2: 10.0 ms, CPU 20.0 ms never (least error 1.84e-4)");
-        assert_eq!(lines[3], "pygfx never (least error 1.65e-3) never (least error 1.65e-3)");
+        assert_eq!(lines[2], "cpu fast step 1/2: 10.0 ms, CPU 20.0 ms not by step 1/2: 1.84e-4");
+        assert_eq!(lines[3], "pygfx not by step 1/2: 1.65e-3 not by step 1/2: 1.65e-3");
+        assert!(lines[4].starts_with("note: --to-error"));
+        let probe = |name: &str| Probe { contestant: name.to_owned(), step_voxels: 0.125, rmse: 7e-5 };
+        let text = probes("ml-64", 0.125, [probe("cpu fast"), probe("ash exact")].iter());
+        assert_eq!(text, "ml-64, step 1/8: RMSE x 1e3 of one picture: cpu fast 0.070, ash exact 0.070\n");
     }
 }
