@@ -12,6 +12,9 @@ use super::standing::{BOUNDS, Reached, TimeRatio};
 use crate::report::step_label;
 use crate::turns::Spread;
 
+/// Errors above this are not of steps, filters and eight bits.
+const ANOTHER_SCENE: f64 = 0.03;
+
 /// The scene, who takes part, and who does not.
 pub(super) fn heading(scene: &SceneReport) -> String {
     let [x, y, z] = scene.dims;
@@ -105,6 +108,13 @@ pub(super) fn step(scene: &SceneReport, step: &StepReport) -> String {
             let _ = writeln!(text, "failed: {}: {reason}", c.name);
         }
     }
+    for odd in step.rows.iter().filter(|row| shows_something_else(row, &step.rows)) {
+        let (name, rmse) = (&odd.contestant, odd.rmse);
+        let _ = writeln!(
+            text,
+            "note: {name}: an RMSE of {rmse:.3} is that of another scene; its times say nothing of this one"
+        );
+    }
     if !step.ratios.is_empty() {
         let mut lines = Table::new();
         lines.load_preset(NOTHING).set_header(["CPU time as a ratio", "", "wall time"]);
@@ -113,6 +123,12 @@ pub(super) fn step(scene: &SceneReport, step: &StepReport) -> String {
         let _ = writeln!(text, "{lines}");
     }
     text
+}
+
+/// Whether a picture has little to do with the scene. Too large a step has large errors, too, but of all contestants.
+fn shows_something_else(row: &Measured, all: &[Measured]) -> bool {
+    let least = all.iter().map(|row| row.rmse).fold(f64::INFINITY, f64::min);
+    row.rmse > ANOTHER_SCENE.max(4.0 * least)
 }
 
 fn row(r: &Measured) -> [String; 7] {
@@ -149,6 +165,13 @@ mod tests {
         assert_eq!(lines[0], "blobs-256, step 1/2: ms a frame, medians of 3");
         assert_eq!(lines[2], "cpu fast 10.0 (9.0 to 11.0) 20.0 (18.0 to 22.0) 0.184 0.0018");
         assert!(lines[3].starts_with("pygfx 20.0") && lines[3].ends_with("1.646 0.0165"), "{text}");
+        assert!(!text.contains("note:"), "{text}");
+        let black =
+            StepReport { rows: vec![measured("vtk-gpu", 0.5, 1.0, 0.155), report.rows[0].clone()], ..report.clone() };
+        assert!(step(&scene, &black).contains("note: vtk-gpu: an RMSE of 0.155 is that of another scene; "));
+        let coarse =
+            StepReport { rows: black.rows.iter().map(|r| Measured { rmse: 0.155, ..r.clone() }).collect(), ..black };
+        assert!(!step(&scene, &coarse).contains("note:"));
         let text = times_to_errors(&scene);
         let lines: Vec<String> = text.lines().map(words).collect();
         assert_eq!(lines[2], "cpu fast step 1/2: 10.0 ms, CPU 20.0 ms not by step 1/2: 1.84e-4");
