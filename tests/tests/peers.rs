@@ -95,9 +95,10 @@ fn peers_take_part_are_absent_or_fail() {
         text.lines().any(|l| l.starts_with("failed: vispy: ") && l.ends_with("(exit status: 1); out of memory")),
         "{text}"
     );
+    assert!(text.contains("note: vtk-gpu: an RMSE of 0.") && !text.contains("note: cpu exact: an"), "{text}");
     // The program has the profile of its test.
     assert_eq!(text.contains("note: cpu fast, other cpu fast"), cfg!(debug_assertions), "{text}");
-    let report: Value = serde_json::from_slice(&fs::read(folder.path().join("out/peers.json")).unwrap()).unwrap();
+    let report = report(folder.path());
     let scene = &report["scenes"][0];
     let absent = |name: &str| {
         let all = scene["contestants"].as_array().unwrap();
@@ -135,13 +136,15 @@ fn peers_bring_a_first_picture_from_a_file() {
     let output = run(folder.path(), "--first --peers vtk-gpu,pygfx --modes fast");
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
-    let report: Value = serde_json::from_slice(&fs::read(folder.path().join("out/peers.json")).unwrap()).unwrap();
+    let report = report(folder.path());
     let first = &report["first"][0];
     let (own, fake) = (&first["pictures"][0], &first["pictures"][1]);
     let parts: Vec<&str> = own["parts"].as_array().unwrap().iter().map(|p| p[0].as_str().unwrap()).collect();
     assert_eq!(parts, ["read", "octree", "device", "prepare", "upload", "render", "read-back"]);
     assert!(own["process"]["median"].as_f64() > own["wall"]["median"].as_f64());
     assert_eq!((&fake["wall"]["median"], &fake["cpu"]["median"]), (&6.0.into(), &9.0.into()));
+    assert!(own["rmse"].as_f64().unwrap() < 0.01 && fake["rmse"].as_f64().unwrap() > 0.05, "{first}");
+    assert!(text.contains("note: vtk-gpu: an RMSE of 0."), "{text}");
     assert_eq!(first["absent"][0]["absent"], "no module");
 }
 
@@ -194,7 +197,7 @@ fn peers_that_draw_something_else_have_large_errors() {
         let folder = tempfile::tempdir().unwrap();
         let liar = folder.path().join("liar");
         program(&liar, &LIAR.replace("LIE", lie).replace("PEERS", env!("CARGO_BIN_EXE_peers")));
-        let words = "--scene blobs --steps 1/4 --modes exact --peers none --turn 2 --other";
+        let words = "--scene blobs --steps 1/4 --modes exact --peers none --other";
         let output = run(folder.path(), &format!("{words} {}", liar.display()));
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let report = report(folder.path());

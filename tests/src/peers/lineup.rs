@@ -164,6 +164,9 @@ impl Exhibit {
 
     /// A contestant that has read the file. The inner error says why it is absent.
     pub(super) fn open(&self, lineup: &Lineup, who: Who) -> Result<Result<Contestant, String>, PeersError> {
+        if let (Who::Peer(_), Some(reason)) = (who, lineup.python.missing()) {
+            return Ok(Err(reason));
+        }
         let adapter = self.adapter.clone().filter(|_| who.backend() != BackendKind::Cpu.name());
         let (contestant, scene) = (who.served_name(), self.file.clone());
         let opening = Opening { contestant, scene, brick: self.brick, adapter };

@@ -7,6 +7,7 @@ use brickfield::BackendKind;
 use serde::Serialize;
 
 use super::answers::{Answers, read_picture};
+use super::beside::Beside;
 use super::lineup::{Build, Exhibit, Lineup, Who};
 use super::page::Page;
 use super::process::Contestant;
@@ -18,9 +19,11 @@ use crate::compare::rivals::Rivals;
 use crate::report::BackendInfo;
 use crate::turns::{Spread, take_turns};
 
-/// Rounds of a step that are not timed: a frame of a camera that has turned, then the picture, of one that has not. A contestant
-/// that draws what it drew before shows the wrong picture.
+/// Rounds of a step that are not timed: a frame of a camera that looks from elsewhere, then the picture. A contestant that draws
+/// what it drew before shows the wrong picture.
 const WARM_UP: u32 = 2;
+/// How far the camera of the first round is turned.
+const ELSEWHERE_DEGREES: f64 = 30.0;
 
 /// A scene, all contestants and steps.
 #[derive(Clone, Debug, Serialize)]
@@ -75,6 +78,15 @@ pub struct Measured {
     /// Over all pixels and three colour channels, against the answer of its domain.
     pub rmse: f64,
     pub max_abs: f64,
+    /// A shift of the picture from the answer.
+    pub beside: Beside,
+}
+
+/// What is said of a picture.
+pub(super) struct Judged {
+    pub(super) rmse: f64,
+    pub(super) max_abs: f64,
+    pub(super) beside: Beside,
 }
 
 /// The error of a contestant at a step at which it was not timed.
@@ -271,7 +283,8 @@ fn frames(
             return Ok(f64::NAN);
         }
         let own = &mut found[turn.contestant];
-        let drawing = exhibit.drawing(step, args.turn * (f64::from(turn.round) - 1.0));
+        let turned = if turn.round == 0 { ELSEWHERE_DEGREES } else { args.turn * f64::from(turn.round - 1) };
+        let drawing = exhibit.drawing(step, turned);
         let path = exhibit.folder.path().join(format!("{}.f32", turn.contestant));
         let drawn = draw(contestant, drawing, turn.round, own, &path);
         Ok(drawn.unwrap_or_else(|reason| {
@@ -304,10 +317,11 @@ fn draw(
 
 impl Frames {
     /// The times of the timed frames, with the errors of the picture.
-    pub(super) fn measured(&self, who: Who, step_voxels: f64, rmse: f64, max_abs: f64) -> Measured {
+    pub(super) fn measured(&self, who: Who, step_voxels: f64, judged: Judged) -> Measured {
         let wall_ms: Vec<f64> = self.timed.iter().map(|d| d.wall_ms).collect();
         let cpu_ms: Vec<f64> = self.timed.iter().map(|d| d.cpu_ms).collect();
         let (wall, cpu) = (Spread::of(&wall_ms), Spread::of(&cpu_ms));
-        Measured { contestant: who.to_string(), step_voxels, wall, cpu, wall_ms, cpu_ms, rmse, max_abs }
+        let Judged { rmse, max_abs, beside } = judged;
+        Measured { contestant: who.to_string(), step_voxels, wall, cpu, wall_ms, cpu_ms, rmse, max_abs, beside }
     }
 }

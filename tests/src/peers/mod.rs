@@ -3,9 +3,11 @@
 //! ```text
 //!  scene --> volume.nrrd --> a process of each contestant, kept alive         reads the file once
 //!                                     |
-//!  step, round k: the camera turned by k degrees, each contestant a frame:    wall and CPU time of its own process
+//!  step: a frame from elsewhere
 //!                                     |
-//!  round 0: the picture --> error against the continuous answer
+//!  the picture --> error against the continuous answer
+//!                                     |
+//!  round k: the camera turned by k degrees, each contestant a frame:          wall and CPU time of its own process
 //! ```
 //!
 //! A contestant is a mode of a backend of this build, the same of another build (`--other`), or a peer: VTK's fixed-point and
@@ -14,11 +16,12 @@
 //!
 //! Pictures are compared as they are seen over black, in three colour channels: not every peer hands out alpha. Each is held
 //! to the answer of its own [`Domain`]: VTK ends a volume at the outer sample centres, all others at the outer voxels' faces.
-//! A peer that cannot be had is listed with its reason.
+//! A contestant that cannot be had, fails, or gives no answer in time is listed with its reason, and the others go on.
 //!
 //! `--first` measures something else: from a file to the first picture, by a new process each time.
 
 mod answers;
+mod beside;
 mod descent;
 mod first;
 mod lineup;
@@ -45,6 +48,7 @@ use crate::compare::{CompareError, RivalArgs, each_once};
 use crate::frames::degrees;
 use crate::report::{Machine, commit};
 
+pub use beside::Beside;
 pub use first::{FirstPicture, FirstReport};
 pub use lineup::Peer;
 pub use measure::{ContestantInfo, Measured, Probe, SceneReport, StepReport};
@@ -66,6 +70,7 @@ use python::Python;
     after_help = "Examples:
   peers --install                                  once: makes target/peers with the peers in it
   peers --scene blobs --steps 1/2
+  peers --scene sharp --to-error                   on to smaller steps, until each reaches 1e-4 or can be seen never to
   peers --first                                    from a file to the first picture, 256^3 and 512^3
   peers --other ../before/target/debug/peers       this build, another one and the peers in one run
   peers engine.vti --transfer ct-bone --peers vtk-gpu,pygfx"
@@ -105,7 +110,7 @@ pub struct PeersArgs {
     /// The `peers` program of another build: its Brickfield takes part, too, as `other`
     #[arg(long, value_name = "PROGRAM")]
     pub other: Option<PathBuf>,
-    /// Timed frames of each contestant, after the one whose picture is kept and one that warms up; fewer than 6 give no
+    /// Timed frames of each contestant, after one that warms up and the one whose picture is kept; fewer than 6 give no
     /// interval of 95 %. With --first, its timed processes
     #[arg(long, default_value_t = 7, default_value_if("first", "true", "3"), value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub frames: u32,
@@ -128,7 +133,7 @@ pub struct PeersArgs {
     /// Make target/peers, a Python environment, and install the peers in it
     #[arg(long)]
     pub install: bool,
-    /// Measure nothing, but draw frames on request, for another `peers`
+    /// Measure nothing, but draw frames on request (lines of JSON), for another `peers`
     #[arg(long)]
     pub serve: bool,
     #[command(flatten)]
@@ -183,8 +188,8 @@ pub enum PeersError {
     Size { width: u32, height: u32 },
     #[error("{option}: the peers draw whole volumes at full resolution")]
     Whole { option: &'static str },
-    #[error("{what}: {reason}")]
-    Install { what: String, reason: String },
+    #[error("--install: {what}: {reason}")]
+    Install { what: &'static str, reason: String },
     #[error("{}: {source}", path.display())]
     Out { path: PathBuf, source: io::Error },
     #[error("the streams of requests: {0}")]
@@ -242,6 +247,7 @@ pub fn peers(args: &PeersArgs, say: &mut dyn FnMut(&str)) -> Result<Option<Peers
     }
     if args.install {
         Python::install()?;
+        say(&format!("{} has the peers; `cargo xtask peers` finds it\n", python::ENVIRONMENT));
         return Ok(None);
     }
     check(args)?;

@@ -177,6 +177,7 @@ impl fmt::Display for Reached {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::beside::Beside;
     use super::super::measure::{Probe, StepReport};
     use super::*;
     use crate::turns::Spread;
@@ -193,6 +194,7 @@ pub(super) mod tests {
             cpu_ms,
             rmse,
             max_abs: 10.0 * rmse,
+            beside: Beside { pixels: [0.03, 0.04], share: 0.05 },
         }
     }
 
