@@ -45,7 +45,7 @@ class Peer:
             canvas = RenderCanvas(size=(scene.size, scene.size), pixel_ratio=1)
             self.renderer = pygfx.renderers.WgpuRenderer(canvas, pixel_scale=1, pixel_filter="nearest", ppaa="none")
         with phases.phase("scene"):
-            low, high = scene.value_range()
+            low, high = map_range(scene)
             if voxels.dtype != np.uint8:
                 voxels, low, high = ((voxels.astype("f4") - low) / (high - low)), 0.0, 1.0
             self.grid = pygfx.Geometry(grid=pygfx.Texture(voxels, dim=3))
@@ -97,9 +97,15 @@ def patched(name, code, step_voxels, scene):
     return code[:at] + loop + code[at:]
 
 
+def map_range(scene):
+    """The values at the outer faces of the map, whose outer texels' centres are the first and the last knot: beyond, it is constant."""
+    low, high = scene.value_range()
+    half_texel = 0.5 * (high - low) / (KNOTS - 1)
+    return low - half_texel, high + half_texel
+
+
 def optics_map(scene):
     """Colours, and extinctions as their alpha."""
-    low, high = scene.value_range()
-    extinction, color = scene.optics(low + (high - low) * (np.arange(KNOTS) + 0.5) / KNOTS)
+    extinction, color = scene.optics(np.linspace(*scene.value_range(), KNOTS))
     texels = np.concatenate([color, extinction[:, None]], 1).astype("f4")
     return pygfx.TextureMap(pygfx.Texture(texels, dim=1, colorspace="srgb"), filter="linear", wrap="clamp")

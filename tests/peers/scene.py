@@ -30,10 +30,7 @@ class Scene(SimpleNamespace):
         return np.fromfile(self.path, self.dtype, offset=self.offset).reshape(self.dims[::-1])
 
     def value_range(self):
-        """The values of a texture's 0 and 1."""
-        kind = np.dtype(self.dtype)
-        if kind.kind == "u" and kind.itemsize <= 2:
-            return 0.0, float(np.iinfo(kind).max)
+        """The first and the last knot: optics are constant beyond."""
         return float(self.values[0]), float(self.values[-1])
 
     def optics(self, values):

@@ -10,6 +10,9 @@ vispy.use("egl")
 from vispy import gloo, scene as graph  # noqa: E402  after the choice of the backend
 from vispy.color.colormap import BaseColormap  # noqa: E402
 
+# The types that vispy has textures of.
+TEXTURES = (np.uint8, np.uint16, np.float32)
+
 
 class Peer:
     def __init__(self, contestant, scene, phases):
@@ -18,6 +21,8 @@ class Peer:
         self.scene, self.step_voxels = scene, None
         with phases.phase("read"):
             voxels = scene.voxels()
+            if voxels.dtype not in TEXTURES:
+                voxels = voxels.astype("f4")
         with phases.phase("device"):
             self.canvas = graph.SceneCanvas(size=(scene.size, scene.size), show=False, bgcolor="black", dpi=96)
         with phases.phase("scene"):

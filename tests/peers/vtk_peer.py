@@ -14,6 +14,8 @@ class Peer:
             image = reader.GetOutput()
         if list(image.GetDimensions()) != scene.dims:
             raise ValueError(f"{scene.path}: vtkNrrdReader found {image.GetDimensions()} voxels, not {scene.dims}")
+        if image.GetScalarType() == vtk.VTK_CHAR:
+            image = signed(image)
         image.SetOrigin(0, 0, 0)
         image.SetSpacing(*scene.spacing)
         with phases.phase("device"):
@@ -21,6 +23,7 @@ class Peer:
         with phases.phase("scene"):
             fixed = contestant == "vtk-fixed"
             self.mapper = fixed_mapper() if fixed else gpu_mapper()
+            self.complaints = complaints(self.mapper)
             self.mapper.SetInputData(image)
             view.AddViewProp(volume(scene, self.mapper))
             self.camera = view.GetActiveCamera()
@@ -43,6 +46,8 @@ class Peer:
         self.camera.SetClippingRange(1e-3 * distance, distance + 4 * extent)
         self.window.Render()
         self.window.WaitForCompletion()
+        if self.complaints:
+            raise RuntimeError(self.complaints[0])
 
     def picture(self):
         grab = vtk.vtkWindowToImageFilter()
@@ -54,6 +59,27 @@ class Peer:
         image = grab.GetOutput()
         width, height, _ = image.GetDimensions()
         return numpy_support.vtk_to_numpy(image.GetPointData().GetScalars()).reshape(height, width, 3)[::-1]
+
+
+def signed(image):
+    """`char` may be signed or not; the mappers refuse it, and NRRD's `int8` is read as that."""
+    cast = vtk.vtkImageCast()
+    cast.SetInputData(image)
+    cast.SetOutputScalarType(vtk.VTK_SIGNED_CHAR)
+    cast.Update()
+    return cast.GetOutput()
+
+
+def complaints(mapper):
+    """A list that receives what a mapper complains of: it goes on with a picture that shows nothing."""
+    heard = []
+
+    def hear(_, __, text):
+        heard.append(text.strip())
+
+    hear.CallDataType = "string0"
+    mapper.AddObserver("ErrorEvent", hear)
+    return heard
 
 
 def fixed_mapper():

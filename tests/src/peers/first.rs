@@ -1,13 +1,17 @@
 //! From a file to the first picture: a new process each time, so that nothing is read, built or compiled before.
 //!
 //! The file is in the system's cache, and drivers may have kept compiled shaders on disk: a round that is not timed comes first.
+//! Its pictures are held to the answers.
 
+use std::path::Path;
 use std::time::Instant;
 
 use serde::Serialize;
 
+use super::answers::Answers;
 use super::lineup::{Exhibit, Lineup, Who};
 use super::measure::{ContestantInfo, contestants};
+use super::process::Contestant;
 use super::protocol::{Drawing, Part};
 use super::scenes::Subject;
 use super::{PeersArgs, PeersError, table};
@@ -40,8 +44,17 @@ pub struct FirstPicture {
     /// From the start of the process to the picture.
     pub process: Spread,
     pub n_processes: usize,
+    /// Of the picture, over all pixels and three colour channels, against the answer of its domain.
+    pub rmse: f64,
     /// In their order; those of the frame where they are known, else `frame`.
     pub parts: Vec<(String, Spread)>,
+}
+
+/// A contestant's processes.
+#[derive(Default)]
+struct Runs {
+    rmse: f64,
+    timed: Vec<Run>,
 }
 
 /// One process.
@@ -63,26 +76,21 @@ pub(super) fn first(
     // Who is there at all; the processes end here.
     let infos = contestants(args, lineup, &exhibit)?.1;
     let (mut present, mut absent): (Vec<_>, Vec<_>) = infos.into_iter().partition(|info| info.absent.is_none());
-    let mut runs: Vec<Vec<Run>> = present.iter().map(|_| Vec::new()).collect();
+    let mut runs: Vec<Runs> = present.iter().map(|_| Runs::default()).collect();
+    let mut answers = Answers::new(&exhibit.subject, args.view.size);
     let drawing = exhibit.drawing(args.steps[0], 0.0);
     take_turns::<PeersError>(present.len(), args.frames, |turn| {
-        let info = &mut present[turn.contestant];
+        let (info, runs) = (&mut present[turn.contestant], &mut runs[turn.contestant]);
         if info.absent.is_some() {
             return Ok(f64::NAN);
         }
-        match run(&exhibit, lineup, info.who, drawing)? {
-            Ok(run) => {
-                let ms = run.wall_ms;
-                if !turn.warms_up() {
-                    runs[turn.contestant].push(run);
-                }
-                Ok(ms)
-            }
-            Err(reason) => {
-                info.absent = Some(reason);
-                Ok(f64::NAN)
-            }
-        }
+        let done = if turn.warms_up() {
+            error(&exhibit, lineup, info.who, drawing, &mut answers)?.map(|rmse| runs.rmse = rmse)
+        } else {
+            run(&exhibit, lineup, info.who, drawing)?.and_then(|run| runs.add(run))
+        };
+        info.absent = done.err();
+        Ok(runs.timed.last().map_or(f64::NAN, |run| run.wall_ms))
     })?;
     let (mut pictures, volume) = (Vec::new(), &exhibit.subject.volume);
     for (info, runs) in present.into_iter().zip(runs) {
@@ -101,6 +109,34 @@ pub(super) fn first(
     };
     say(&table::first(&report));
     Ok(report)
+}
+
+impl Runs {
+    /// The error: processes of a contestant do the same.
+    fn add(&mut self, run: Run) -> Result<(), String> {
+        let names = |run: &Run| run.parts.iter().map(|part| part.name.clone()).collect::<Vec<_>>();
+        if let Some(before) = self.timed.first().filter(|before| names(before) != names(&run)) {
+            return Err(format!("its parts were {:?}, and now are {:?}", names(before), names(&run)));
+        }
+        self.timed.push(run);
+        Ok(())
+    }
+}
+
+/// The error of the picture of a process that is not timed. The inner error says why there is none.
+fn error(
+    exhibit: &Exhibit,
+    lineup: &Lineup,
+    who: Who,
+    drawing: Drawing,
+    answers: &mut Answers,
+) -> Result<Result<f64, String>, PeersError> {
+    let picture = exhibit.folder.path().join("first.f32");
+    let mut rmse = |mut contestant: Contestant, picture: &Path| {
+        contestant.picture(drawing, picture)?;
+        answers.rmse(picture, &contestant.opened)
+    };
+    Ok(exhibit.open(lineup, who)?.and_then(|contestant| rmse(contestant, &picture)))
 }
 
 /// A process from its start to its first picture. The inner error says why there is none.
@@ -124,7 +160,7 @@ fn run(exhibit: &Exhibit, lineup: &Lineup, who: Who, drawing: Drawing) -> Result
     Ok(Ok(Run { parts, wall_ms, cpu_ms, process_ms }))
 }
 
-fn picture(contestant: String, runs: &[Run]) -> FirstPicture {
+fn picture(contestant: String, Runs { rmse, timed: runs }: &Runs) -> FirstPicture {
     let of = |ms: &dyn Fn(&Run) -> f64| Spread::of(&runs.iter().map(ms).collect::<Vec<_>>());
     let part = |i: usize| (runs[0].parts[i].name.clone(), of(&|run| run.parts[i].wall_ms));
     FirstPicture {
@@ -133,6 +169,7 @@ fn picture(contestant: String, runs: &[Run]) -> FirstPicture {
         cpu: of(&|run| run.cpu_ms),
         process: of(&|run| run.process_ms),
         n_processes: runs.len(),
+        rmse: *rmse,
         parts: (0..runs[0].parts.len()).map(part).collect(),
     }
 }
@@ -149,8 +186,12 @@ mod tests {
             cpu_ms: 2.0 * ms,
             process_ms: 3.0 * ms,
         };
-        let found = picture("vispy".to_owned(), &[run(10.0), run(40.0), run(20.0)]);
+        let mut runs = Runs { rmse: 1e-3, timed: Vec::new() };
+        [10.0, 40.0, 20.0].into_iter().for_each(|ms| runs.add(run(ms)).unwrap());
+        let found = picture("vispy".to_owned(), &runs);
         assert_eq!((found.wall.median, found.cpu.median, found.process.max), (20.0, 40.0, 120.0));
         assert_eq!((found.n_processes, found.parts[0].0.as_str(), found.parts[0].1.median), (3, "read", 2.0));
+        let other = Run { parts: Vec::new(), ..run(10.0) };
+        assert_eq!(runs.add(other).unwrap_err(), "its parts were [\"read\"], and now are []");
     }
 }

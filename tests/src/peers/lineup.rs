@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::process::Command;
 use std::str::FromStr;
+use std::time::Duration;
 
 use brickfield::BackendKind;
 use brickfield::core::glam::DVec3;
@@ -97,6 +98,8 @@ pub(super) struct Lineup {
     python: Python,
     this: PathBuf,
     other: Option<PathBuf>,
+    /// How long a contestant's answer may take.
+    patience: Duration,
 }
 
 impl Lineup {
@@ -110,7 +113,8 @@ impl Lineup {
         }
         who.extend(each_once(&args.peers).into_iter().flatten().map(Who::Peer));
         let this = std::env::current_exe().map_err(PeersError::Temporary)?;
-        Ok(Lineup { who, python: Python::new(args.python.as_deref())?, this, other: args.other.clone() })
+        let (python, patience) = (Python::new(args.python.as_deref())?, Duration::from_secs(args.patience));
+        Ok(Lineup { who, python, this, other: args.other.clone(), patience })
     }
 
     /// The command of a process that serves a contestant.
@@ -160,9 +164,13 @@ impl Exhibit {
 
     /// A contestant that has read the file. The inner error says why it is absent.
     pub(super) fn open(&self, lineup: &Lineup, who: Who) -> Result<Result<Contestant, String>, PeersError> {
+        if let (Who::Peer(_), Some(reason)) = (who, lineup.python.missing()) {
+            return Ok(Err(reason));
+        }
         let adapter = self.adapter.clone().filter(|_| who.backend() != BackendKind::Cpu.name());
         let (contestant, scene) = (who.served_name(), self.file.clone());
-        Contestant::open(who, lineup.command(who), Opening { contestant, scene, brick: self.brick, adapter })
+        let opening = Opening { contestant, scene, brick: self.brick, adapter };
+        Contestant::open(who, lineup.command(who), opening, lineup.patience)
     }
 
     /// The frame of a camera that has turned.

@@ -1,31 +1,29 @@
 //! Contestants take turns at each step of a scene; their pictures are held to the answers of their domains.
 
-use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use brickfield::BackendKind;
-use brickfield::core::glam::{DVec3, UVec2};
-use brickfield::core::{Aabb, Image};
-use brickfield::cpu::{ContinuousOptions, continuous};
 use serde::Serialize;
 
+use super::answers::{Answers, read_picture};
+use super::beside::Beside;
 use super::lineup::{Build, Exhibit, Lineup, Who};
 use super::page::Page;
 use super::process::Contestant;
-use super::protocol::{Domain, Drawn, Part};
+use super::protocol::{Domain, Drawing, Drawn, Part};
 use super::scenes::Subject;
 use super::standing::{TimeRatio, TimeToError, ratios, times_to_errors};
-use super::{PeersArgs, PeersError, table};
+use super::{PeersArgs, PeersError, descent, table};
 use crate::compare::rivals::Rivals;
-use crate::metrics::opaque;
 use crate::report::BackendInfo;
 use crate::turns::{Spread, take_turns};
 
-/// How far the answer is driven: its error is a thousandth of the least that is asked of a contestant.
-pub(super) const ACCURACY: ContinuousOptions = ContinuousOptions { tolerance: 1e-7, transmittance_floor: 1e-8 };
-/// Frames of a contestant at each step that warm up, after the one whose picture is kept.
-const WARM_UP: u32 = 1;
+/// Rounds of a step that are not timed: a frame of a camera that looks from elsewhere, then the picture. A contestant that draws
+/// what it drew before shows the wrong picture.
+const WARM_UP: u32 = 2;
+/// How far the camera of the first round is turned.
+const ELSEWHERE_DEGREES: f64 = 30.0;
 
 /// A scene, all contestants and steps.
 #[derive(Clone, Debug, Serialize)]
@@ -36,6 +34,8 @@ pub struct SceneReport {
     pub scalar: String,
     pub contestants: Vec<ContestantInfo>,
     pub steps: Vec<StepReport>,
+    /// Pictures that were drawn once, for their errors alone.
+    pub probes: Vec<Probe>,
     pub times_to_errors: Vec<TimeToError>,
 }
 
@@ -78,6 +78,24 @@ pub struct Measured {
     /// Over all pixels and three colour channels, against the answer of its domain.
     pub rmse: f64,
     pub max_abs: f64,
+    /// A shift of the picture from the answer.
+    pub beside: Beside,
+}
+
+/// What is said of a picture.
+pub(super) struct Judged {
+    pub(super) rmse: f64,
+    pub(super) max_abs: f64,
+    pub(super) beside: Beside,
+}
+
+/// The error of a contestant at a step at which it was not timed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[allow(missing_docs)]
+pub struct Probe {
+    pub contestant: String,
+    pub step_voxels: f64,
+    pub rmse: f64,
 }
 
 /// A contestant's frames at a step.
@@ -87,25 +105,14 @@ pub(super) struct Frames {
     timed: Vec<Drawn>,
 }
 
-/// The answers of domains and fields of view, over black.
-struct Answers<'a> {
-    subject: &'a Subject,
-    size: UVec2,
-    known: HashMap<(Domain, u64), Image<f64>>,
-}
-
-impl Answers<'_> {
-    fn of(&mut self, domain: Domain, view: f64) -> &Image<f64> {
-        let Answers { subject, size, known } = self;
-        known.entry((domain, view.to_bits())).or_insert_with(|| {
-            let (volume, camera) = (&subject.volume, subject.camera(view));
-            let clip = match domain {
-                Domain::Voxels => Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY },
-                Domain::Centres => Aabb { min: DVec3::ZERO, max: volume.grid().dims().as_dvec3() - 1.0 },
-            };
-            opaque(&continuous(volume, &subject.transfer, &camera, *size, &clip, &ACCURACY).image)
-        })
-    }
+/// A scene that is being measured.
+pub(super) struct Measuring<'a> {
+    args: &'a PeersArgs,
+    exhibit: &'a Exhibit,
+    present: Vec<Contestant>,
+    answers: Answers<'a>,
+    page: Page<'a>,
+    pub(super) report: SceneReport,
 }
 
 /// Measures a scene, and writes its page.
@@ -116,41 +123,88 @@ pub(super) fn scene(
     say: &mut dyn FnMut(&str),
 ) -> Result<SceneReport, PeersError> {
     let exhibit = Exhibit::new(args, subject)?;
-    let subject = &exhibit.subject;
-    let (mut present, contestants) = contestants(args, lineup, &exhibit)?;
-    let mut report = SceneReport {
-        name: subject.name.clone(),
-        dims: subject.volume.grid().dims().to_array(),
-        scalar: subject.volume.scalar_type().to_string(),
-        contestants,
-        steps: Vec::new(),
-        times_to_errors: Vec::new(),
-    };
-    say(&table::heading(&report));
-    let mut answers = Answers { subject, size: args.view.size, known: HashMap::new() };
-    let (begin, answer) = (Instant::now(), answers.of(Domain::Voxels, 1.0));
-    let mut page = Page::new(args, subject, answer, begin.elapsed().as_secs_f64())?;
+    let mut measuring = Measuring::new(args, lineup, &exhibit, say)?;
     for step in &args.steps {
-        let frames = frames(args, &exhibit, &mut present, *step, &mut report.contestants)?;
+        measuring.step(*step, &mut |_| true, say)?;
+    }
+    if args.to_error {
+        descent::descend(&mut measuring, say)?;
+    }
+    let Measuring { mut report, page, .. } = measuring;
+    report.times_to_errors = times_to_errors(&report);
+    say(&table::times_to_errors(&report));
+    page.publish(&report)?;
+    Ok(report)
+}
+
+impl<'a> Measuring<'a> {
+    fn new(
+        args: &'a PeersArgs,
+        lineup: &Lineup,
+        exhibit: &'a Exhibit,
+        say: &mut dyn FnMut(&str),
+    ) -> Result<Measuring<'a>, PeersError> {
+        let subject = &exhibit.subject;
+        let (present, contestants) = contestants(args, lineup, exhibit)?;
+        let report = SceneReport {
+            name: subject.name.clone(),
+            dims: subject.volume.grid().dims().to_array(),
+            scalar: subject.volume.scalar_type().to_string(),
+            contestants,
+            steps: Vec::new(),
+            probes: Vec::new(),
+            times_to_errors: Vec::new(),
+        };
+        say(&table::heading(&report));
+        let mut answers = Answers::new(subject, args.view.size);
+        let (begin, answer) = (Instant::now(), answers.of(Domain::Voxels, 1.0));
+        let page = Page::new(args, subject, answer, begin.elapsed().as_secs_f64())?;
+        Ok(Measuring { args, exhibit, present, answers, page, report })
+    }
+
+    /// Times some contestants at a step.
+    pub(super) fn step(
+        &mut self,
+        step_voxels: f64,
+        is_timed: &mut dyn FnMut(&str) -> bool,
+        say: &mut dyn FnMut(&str),
+    ) -> Result<(), PeersError> {
+        let Measuring { args, exhibit, present, answers, page, report } = self;
+        let mut present: Vec<&mut Contestant> =
+            present.iter_mut().filter(|contestant| is_timed(&contestant.who.to_string())).collect();
+        let frames = frames(args, exhibit, &mut present, step_voxels, &mut report.contestants)?;
         let mut rows = Vec::new();
         for (contestant, frames) in present.iter().zip(frames) {
             let Some(frames) = frames else { continue };
             let answer = answers.of(contestant.opened.domain, contestant.opened.view);
-            let image = read_picture(&frames.picture, answer.size())?;
-            match page.add(contestant, *step, &frames, &image, answer)? {
+            let row = match read_picture(&frames.picture, answer.size()) {
+                Ok(image) => page.add(contestant, step_voxels, &frames, &image, answer)?,
+                Err(reason) => Err(reason),
+            };
+            match row {
                 Ok(row) => rows.push(row),
                 Err(reason) => fail(&mut report.contestants, contestant.who, reason),
             }
         }
         let who: Vec<Who> = present.iter().map(|c| c.who).collect();
-        let step = StepReport { step_voxels: *step, ratios: ratios(&who, &rows), rows };
-        say(&table::step(&report, &step));
+        let step = StepReport { step_voxels, ratios: ratios(&who, &rows), rows };
+        say(&table::step(report, &step));
         report.steps.push(step);
+        Ok(())
     }
-    report.times_to_errors = times_to_errors(&report.steps);
-    say(&table::times_to_errors(&report));
-    page.publish(&report)?;
-    Ok(report)
+
+    /// Has a contestant draw one picture at a step, for its error.
+    pub(super) fn probe(&mut self, contestant: &str, step_voxels: f64) {
+        let Measuring { exhibit, present, answers, report, .. } = self;
+        let of_that_name = present.iter_mut().find(|c| c.who.to_string() == contestant);
+        let Some(present) = of_that_name else { return };
+        let path = exhibit.folder.path().join("probe.f32");
+        let drawn = present.picture(exhibit.drawing(step_voxels, 0.0), &path);
+        match drawn.and_then(|_| answers.rmse(&path, &present.opened)) {
+            Ok(rmse) => report.probes.push(Probe { contestant: contestant.to_owned(), step_voxels, rmse }),
+            Err(reason) => fail(&mut report.contestants, present.who, reason),
+        }
+    }
 }
 
 /// The contestants that can be had, and a line for each that was asked for.
@@ -217,58 +271,57 @@ fn fail(infos: &mut [ContestantInfo], who: Who, reason: String) {
 fn frames(
     args: &PeersArgs,
     exhibit: &Exhibit,
-    present: &mut [Contestant],
+    present: &mut [&mut Contestant],
     step: f64,
     infos: &mut [ContestantInfo],
 ) -> Result<Vec<Option<Frames>>, PeersError> {
     let mut found: Vec<Option<Frames>> = present.iter().map(|_| None).collect();
     let failed = |infos: &[ContestantInfo], who: Who| infos.iter().any(|i| i.who == who && i.absent.is_some());
-    take_turns::<PeersError>(present.len(), WARM_UP + args.frames, |turn| {
+    take_turns::<PeersError>(present.len(), WARM_UP - 1 + args.frames, |turn| {
         let contestant = &mut present[turn.contestant];
         if failed(infos, contestant.who) {
             return Ok(f64::NAN);
         }
-        let drawing = exhibit.drawing(step, args.turn * f64::from(turn.round));
         let own = &mut found[turn.contestant];
-        let drawn = if turn.warms_up() {
-            let picture = exhibit.folder.path().join(format!("{}.f32", turn.contestant));
-            let drawn = contestant.picture(drawing, &picture);
-            *own = drawn.clone().ok().map(|first| Frames { picture, first, timed: Vec::new() });
-            drawn
-        } else {
-            contestant.frame(drawing)
-        };
-        match drawn {
-            Ok(drawn) => {
-                let ms = drawn.wall_ms;
-                own.iter_mut().filter(|_| turn.round > WARM_UP).for_each(|own| own.timed.push(drawn.clone()));
-                Ok(ms)
-            }
-            Err(reason) => {
-                *own = None;
-                fail(infos, contestant.who, reason);
-                Ok(f64::NAN)
-            }
-        }
+        let turned = if turn.round == 0 { ELSEWHERE_DEGREES } else { args.turn * f64::from(turn.round - 1) };
+        let drawing = exhibit.drawing(step, turned);
+        let path = exhibit.folder.path().join(format!("{}.f32", turn.contestant));
+        let drawn = draw(contestant, drawing, turn.round, own, &path);
+        Ok(drawn.unwrap_or_else(|reason| {
+            *own = None;
+            fail(infos, contestant.who, reason);
+            f64::NAN
+        }))
     })?;
     Ok(found)
 }
 
+/// A frame of a round, in milliseconds.
+fn draw(
+    contestant: &mut Contestant,
+    drawing: Drawing,
+    round: u32,
+    own: &mut Option<Frames>,
+    picture: &Path,
+) -> Result<f64, String> {
+    let is_picture = round == WARM_UP - 1;
+    let drawn = if is_picture { contestant.picture(drawing, picture)? } else { contestant.frame(drawing)? };
+    let ms = drawn.wall_ms;
+    match own {
+        None => *own = Some(Frames { picture: picture.to_owned(), first: drawn, timed: Vec::new() }),
+        Some(frames) if round >= WARM_UP => frames.timed.push(drawn),
+        Some(_) => {}
+    }
+    Ok(ms)
+}
+
 impl Frames {
     /// The times of the timed frames, with the errors of the picture.
-    pub(super) fn measured(&self, who: Who, step_voxels: f64, rmse: f64, max_abs: f64) -> Measured {
+    pub(super) fn measured(&self, who: Who, step_voxels: f64, judged: Judged) -> Measured {
         let wall_ms: Vec<f64> = self.timed.iter().map(|d| d.wall_ms).collect();
         let cpu_ms: Vec<f64> = self.timed.iter().map(|d| d.cpu_ms).collect();
         let (wall, cpu) = (Spread::of(&wall_ms), Spread::of(&cpu_ms));
-        Measured { contestant: who.to_string(), step_voxels, wall, cpu, wall_ms, cpu_ms, rmse, max_abs }
+        let Judged { rmse, max_abs, beside } = judged;
+        Measured { contestant: who.to_string(), step_voxels, wall, cpu, wall_ms, cpu_ms, rmse, max_abs, beside }
     }
-}
-
-/// A raw picture of a contestant.
-fn read_picture(path: &Path, size: UVec2) -> Result<Image<f32>, PeersError> {
-    let out = |source| PeersError::Out { path: path.to_owned(), source };
-    let bytes = std::fs::read(path).map_err(out)?;
-    let channel = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-    let pixels = bytes.chunks_exact(16).map(|p| std::array::from_fn(|c| channel(&p[4 * c..]))).collect();
-    Image::new(size, pixels).map_err(|e| out(std::io::Error::other(e)))
 }

@@ -3,9 +3,11 @@
 //! ```text
 //!  scene --> volume.nrrd --> a process of each contestant, kept alive         reads the file once
 //!                                     |
-//!  step, round k: the camera turned by k degrees, each contestant a frame:    wall and CPU time of its own process
+//!  step: a frame from elsewhere
 //!                                     |
-//!  round 0: the picture --> error against the continuous answer
+//!  the picture --> error against the continuous answer
+//!                                     |
+//!  round k: the camera turned by k degrees, each contestant a frame:          wall and CPU time of its own process
 //! ```
 //!
 //! A contestant is a mode of a backend of this build, the same of another build (`--other`), or a peer: VTK's fixed-point and
@@ -14,10 +16,13 @@
 //!
 //! Pictures are compared as they are seen over black, in three colour channels: not every peer hands out alpha. Each is held
 //! to the answer of its own [`Domain`]: VTK ends a volume at the outer sample centres, all others at the outer voxels' faces.
-//! A peer that cannot be had is listed with its reason.
+//! A contestant that cannot be had, fails, or gives no answer in time is listed with its reason, and the others go on.
 //!
 //! `--first` measures something else: from a file to the first picture, by a new process each time.
 
+mod answers;
+mod beside;
+mod descent;
 mod first;
 mod lineup;
 mod measure;
@@ -43,9 +48,10 @@ use crate::compare::{CompareError, RivalArgs, each_once};
 use crate::frames::degrees;
 use crate::report::{Machine, commit};
 
+pub use beside::Beside;
 pub use first::{FirstPicture, FirstReport};
 pub use lineup::Peer;
-pub use measure::{ContestantInfo, Measured, SceneReport, StepReport};
+pub use measure::{ContestantInfo, Measured, Probe, SceneReport, StepReport};
 pub use protocol::{Domain, Part};
 pub use scenes::Generated;
 pub use standing::{Reached, TimeRatio, TimeToError};
@@ -64,6 +70,7 @@ use python::Python;
     after_help = "Examples:
   peers --install                                  once: makes target/peers with the peers in it
   peers --scene blobs --steps 1/2
+  peers --scene sharp --to-error                   on to smaller steps, until each reaches 1e-4 or can be seen never to
   peers --first                                    from a file to the first picture, 256^3 and 512^3
   peers --other ../before/target/debug/peers       this build, another one and the peers in one run
   peers engine.vti --transfer ct-bone --peers vtk-gpu,pygfx"
@@ -89,6 +96,10 @@ pub struct PeersArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::step, default_value = "1/4,1/2,1,2",
           default_value_if("first", "true", "1/2"))]
     pub steps: Vec<f64>,
+    /// Go on to smaller steps, halved down to 1/64: one picture of each contestant that has not reached an error of 1e-4 and
+    /// whose error still falls; where it reaches 1e-3 or 1e-4, the step is measured
+    #[arg(long, conflicts_with = "first")]
+    pub to_error: bool,
     /// Modes of Brickfield
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::mode, default_value = "fast,exact")]
     pub modes: Vec<Mode>,
@@ -99,7 +110,7 @@ pub struct PeersArgs {
     /// The `peers` program of another build: its Brickfield takes part, too, as `other`
     #[arg(long, value_name = "PROGRAM")]
     pub other: Option<PathBuf>,
-    /// Timed frames of each contestant, after the one whose picture is kept and one that warms up; fewer than 6 give no
+    /// Timed frames of each contestant, after one that warms up and the one whose picture is kept; fewer than 6 give no
     /// interval of 95 %. With --first, its timed processes
     #[arg(long, default_value_t = 7, default_value_if("first", "true", "3"), value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub frames: u32,
@@ -109,6 +120,10 @@ pub struct PeersArgs {
     /// Measure the way from a file to the first picture instead, by a new process each time
     #[arg(long)]
     pub first: bool,
+    /// How long the answer of a contestant may take, to read a volume or to draw a frame; one that takes longer is killed, and
+    /// the others go on
+    #[arg(long, value_name = "SECONDS", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    pub patience: u64,
     /// Folder that receives peers.json, and for each scene a page with its pictures
     #[arg(long, value_name = "DIR", default_value = "target/compare-peers")]
     pub out: PathBuf,
@@ -118,7 +133,7 @@ pub struct PeersArgs {
     /// Make target/peers, a Python environment, and install the peers in it
     #[arg(long)]
     pub install: bool,
-    /// Measure nothing, but draw frames on request, for another `peers`
+    /// Measure nothing, but draw frames on request (lines of JSON), for another `peers`
     #[arg(long)]
     pub serve: bool,
     #[command(flatten)]
@@ -173,12 +188,10 @@ pub enum PeersError {
     Size { width: u32, height: u32 },
     #[error("{option}: the peers draw whole volumes at full resolution")]
     Whole { option: &'static str },
-    #[error("{what}: {reason}")]
-    Install { what: String, reason: String },
+    #[error("--install: {what}: {reason}")]
+    Install { what: &'static str, reason: String },
     #[error("{}: {source}", path.display())]
     Out { path: PathBuf, source: io::Error },
-    #[error("{contestant}: its picture: {reason}")]
-    Picture { contestant: String, reason: String },
     #[error("the streams of requests: {0}")]
     Serve(io::Error),
 }
@@ -234,6 +247,7 @@ pub fn peers(args: &PeersArgs, say: &mut dyn FnMut(&str)) -> Result<Option<Peers
     }
     if args.install {
         Python::install()?;
+        say(&format!("{} has the peers; `cargo xtask peers` finds it\n", python::ENVIRONMENT));
         return Ok(None);
     }
     check(args)?;

@@ -5,8 +5,10 @@ use std::time::Instant;
 use brickfield::core::Image;
 use brickfield::core::glam::UVec2;
 
+use super::answers::ACCURACY;
+use super::beside::beside;
 use super::lineup::{Build, Who};
-use super::measure::{ACCURACY, ContestantInfo, Frames, Measured, SceneReport, StepReport};
+use super::measure::{ContestantInfo, Frames, Judged, Measured, SceneReport, StepReport};
 use super::process::Contestant;
 use super::protocol::Domain;
 use super::scenes::Subject;
@@ -74,7 +76,9 @@ impl<'a> Page<'a> {
             Ok(shown) => shown,
             Err(reason) => return Ok(Err(reason)),
         };
-        let measured = frames.measured(who, step_voxels, shown.errors.rmse, shown.errors.worst.difference);
+        let judged =
+            Judged { rmse: shown.errors.rmse, max_abs: shown.errors.worst.difference, beside: beside(image, answer) };
+        let measured = frames.measured(who, step_voxels, judged);
         let samples = self.n_samples(contestant.opened.domain, step_voxels);
         let upload = frames.first.parts.iter().find(|part| part.name == "upload");
         let upload_ms = upload.map_or(0.0, |part| part.wall_ms);
@@ -167,7 +171,7 @@ fn backends(contestants: &[ContestantInfo]) -> Vec<BackendInfo> {
 
 /// The steps of contestants that failed.
 fn left_out(scene: &SceneReport) -> Vec<LeftOut> {
-    let failed = scene.contestants.iter().filter(|c| c.domain.is_some());
+    let failed = scene.contestants.iter().filter(|c| c.domain.is_some() && c.absent.is_some());
     let of = |c: &ContestantInfo| {
         let (mode, rule) = curve(c.who);
         let reason = c.absent.clone().unwrap_or_default();

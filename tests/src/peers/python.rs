@@ -55,9 +55,16 @@ impl Python {
     /// A command that fails.
     pub(super) fn install() -> Result<(), PeersError> {
         let python = Python::new(None)?;
-        run(Command::new("python3").args(["-m", "venv", ENVIRONMENT]))?;
+        run("python3 -m venv", Command::new("python3").args(["-m", "venv", ENVIRONMENT]))?;
         let requirements = python.folder.path().join("requirements.txt");
-        run(Command::new(installed()).args(["-m", "pip", "install", "--requirement"]).arg(requirements))
+        let mut pip = Command::new(installed());
+        run("pip install", pip.args(["-m", "pip", "install", "--requirement"]).arg(requirements))
+    }
+
+    /// Why there are no peers, if nobody has named an interpreter or made one.
+    pub(super) fn missing(&self) -> Option<String> {
+        let is_missing = self.program == installed() && !self.program.exists();
+        is_missing.then(|| format!("there is no {}: `cargo xtask peers --install` makes it", self.program.display()))
     }
 }
 
@@ -66,12 +73,11 @@ fn installed() -> PathBuf {
     Path::new(ENVIRONMENT).join(program)
 }
 
-fn run(command: &mut Command) -> Result<(), PeersError> {
-    let line = || format!("{command:?}");
-    let (what, status) = (line(), command.status());
-    match status {
-        Ok(status) if status.success() => Ok(()),
-        Ok(status) => Err(PeersError::Install { what, reason: status.to_string() }),
-        Err(e) => Err(PeersError::Install { what, reason: e.to_string() }),
-    }
+fn run(what: &'static str, command: &mut Command) -> Result<(), PeersError> {
+    let reason = match command.status() {
+        Ok(status) if status.success() => return Ok(()),
+        Ok(status) => format!("{status}; what it says is above"),
+        Err(e) => e.to_string(),
+    };
+    Err(PeersError::Install { what, reason })
 }

@@ -7,7 +7,7 @@ use brickfield::frame::Mode;
 use serde::Serialize;
 
 use super::lineup::{Build, Peer, Who};
-use super::measure::{Measured, StepReport};
+use super::measure::{ContestantInfo, Measured, SceneReport};
 use crate::report::step_label;
 use crate::turns::Ratio;
 
@@ -34,13 +34,79 @@ pub struct TimeToError {
     pub reached: Reached,
 }
 
-/// The measured step of least CPU time that reaches an error, if one does.
+/// The measured step of least CPU time that reaches an error, or why there is none.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[allow(missing_docs)]
 pub enum Reached {
-    At { step_voxels: f64, wall_ms: f64, cpu_ms: f64 },
-    Never { least_rmse: f64 },
+    At {
+        step_voxels: f64,
+        wall_ms: f64,
+        cpu_ms: f64,
+    },
+    /// From `step_voxels` on, smaller steps do not lower the error.
+    Stays {
+        least_rmse: f64,
+        step_voxels: f64,
+    },
+    /// The error at the least step that was drawn; at smaller ones it may fall.
+    NotYet {
+        rmse: f64,
+        step_voxels: f64,
+    },
+    /// The contestant is absent, or failed on the way.
+    Absent,
+}
+
+/// A contestant's errors, from the greatest step to the least.
+pub(super) struct Standing {
+    steps_and_rmse: Vec<(f64, f64)>,
+}
+
+/// Errors that fall by a lower order than this, over steps of at most [`ASYMPTOTIC`], stay: half a step lowers them by less than
+/// a fifth. Orders of accuracy are 1 and more.
+const LEAST_ORDER: f64 = 1.0 / 3.0;
+/// Steps that are larger, in voxels, say nothing about the errors of small ones.
+const ASYMPTOTIC: f64 = 1.0;
+
+impl Standing {
+    pub(super) fn of(scene: &SceneReport, contestant: &str) -> Standing {
+        let rows = scene.steps.iter().flat_map(|step| &step.rows);
+        let rows = rows.map(|row| (&row.contestant, (row.step_voxels, row.rmse)));
+        let probes = scene.probes.iter().map(|probe| (&probe.contestant, (probe.step_voxels, probe.rmse)));
+        let own = rows.chain(probes).filter(|(name, _)| *name == contestant);
+        let mut steps_and_rmse: Vec<(f64, f64)> = own.map(|(_, point)| point).collect();
+        steps_and_rmse.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // A step that was probed, then timed.
+        steps_and_rmse.dedup_by_key(|point| point.0);
+        Standing { steps_and_rmse }
+    }
+
+    /// Infinite before the first step.
+    pub(super) fn least_rmse(&self) -> f64 {
+        self.steps_and_rmse.iter().map(|(_, rmse)| *rmse).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether smaller steps may lower the error.
+    pub(super) fn may_fall(&self) -> bool {
+        self.stays_from().is_none()
+    }
+
+    /// The step from which on the error stays.
+    fn stays_from(&self) -> Option<f64> {
+        let [.., (large, before), (small, after)] = self.steps_and_rmse.as_slice() else { return None };
+        let order = (before / after).ln() / (large / small).ln();
+        (*large <= ASYMPTOTIC && order < LEAST_ORDER).then_some(*large)
+    }
+
+    /// Why an error is not reached.
+    fn missed(&self) -> Reached {
+        match (self.stays_from(), self.steps_and_rmse.last()) {
+            (Some(step_voxels), _) => Reached::Stays { least_rmse: self.least_rmse(), step_voxels },
+            (None, Some((step_voxels, rmse))) => Reached::NotYet { rmse: *rmse, step_voxels: *step_voxels },
+            (None, None) => Reached::Absent,
+        }
+    }
 }
 
 /// Whose times are stated as a part of whose.
@@ -74,28 +140,21 @@ fn is_held_against(of: Who, to: Who) -> bool {
     }
 }
 
-/// For each contestant and bound, in the order of the first step's rows.
-pub(super) fn times_to_errors(steps: &[StepReport]) -> Vec<TimeToError> {
-    let mut names: Vec<&String> = Vec::new();
-    for row in steps.iter().flat_map(|step| &step.rows) {
-        if !names.contains(&&row.contestant) {
-            names.push(&row.contestant);
-        }
-    }
-    let of = |name: &String| -> Vec<&Measured> {
-        steps.iter().flat_map(|step| &step.rows).filter(|row| row.contestant == *name).collect()
+/// For each contestant and bound.
+pub(super) fn times_to_errors(scene: &SceneReport) -> Vec<TimeToError> {
+    let of = |info: &ContestantInfo| {
+        BOUNDS.map(|bound| TimeToError { contestant: info.name.clone(), bound, reached: reached(scene, info, bound) })
     };
-    let times = |name: &String| {
-        BOUNDS.map(|bound| TimeToError { contestant: name.clone(), bound, reached: reached(&of(name), bound) })
-    };
-    names.into_iter().flat_map(times).collect()
+    scene.contestants.iter().flat_map(of).collect()
 }
 
-fn reached(rows: &[&Measured], bound: f64) -> Reached {
-    let enough = rows.iter().filter(|row| row.rmse <= bound);
+fn reached(scene: &SceneReport, info: &ContestantInfo, bound: f64) -> Reached {
+    let rows = scene.steps.iter().flat_map(|step| &step.rows);
+    let enough = rows.filter(|row| row.contestant == info.name && row.rmse <= bound);
     match enough.min_by(|a, b| a.cpu.median.total_cmp(&b.cpu.median)) {
         Some(row) => Reached::At { step_voxels: row.step_voxels, wall_ms: row.wall.median, cpu_ms: row.cpu.median },
-        None => Reached::Never { least_rmse: rows.iter().map(|row| row.rmse).fold(f64::INFINITY, f64::min) },
+        None if info.absent.is_some() => Reached::Absent,
+        None => Standing::of(scene, &info.name).missed(),
     }
 }
 
@@ -105,13 +164,21 @@ impl fmt::Display for Reached {
             Reached::At { step_voxels, wall_ms, cpu_ms } => {
                 write!(f, "step {}: {wall_ms:.1} ms, CPU {cpu_ms:.1} ms", step_label(*step_voxels))
             }
-            Reached::Never { least_rmse } => write!(f, "never (least error {least_rmse:.2e})"),
+            Reached::Stays { least_rmse, step_voxels } => {
+                write!(f, "never: it stays at {least_rmse:.2e} from step {} on", step_label(*step_voxels))
+            }
+            Reached::NotYet { rmse, step_voxels } => {
+                write!(f, "not by step {}: {rmse:.2e}", step_label(*step_voxels))
+            }
+            Reached::Absent => f.write_str("absent, or failed"),
         }
     }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::beside::Beside;
+    use super::super::measure::{Probe, StepReport};
     use super::*;
     use crate::turns::Spread;
 
@@ -127,6 +194,7 @@ pub(super) mod tests {
             cpu_ms,
             rmse,
             max_abs: 10.0 * rmse,
+            beside: Beside { pixels: [0.03, 0.04], share: 0.05 },
         }
     }
 
@@ -159,24 +227,67 @@ pub(super) mod tests {
         assert_eq!(ratios(&all, &rows[..4]).len(), 2);
     }
 
+    /// A scene of steps, of which each has a row for each contestant.
+    pub(in crate::peers) fn scene(contestants: &[&str], steps: Vec<Vec<Measured>>) -> SceneReport {
+        let info = |name: &&str| ContestantInfo {
+            who: Who::Peer(Peer::Vispy),
+            name: (*name).to_owned(),
+            version: String::new(),
+            device: String::new(),
+            domain: None,
+            phases: Vec::new(),
+            absent: None,
+        };
+        let step = |rows: Vec<Measured>| StepReport { step_voxels: rows[0].step_voxels, rows, ratios: Vec::new() };
+        SceneReport {
+            name: "blobs-256".to_owned(),
+            dims: [256; 3],
+            scalar: "u8".to_owned(),
+            contestants: contestants.iter().map(info).collect(),
+            steps: steps.into_iter().map(step).collect(),
+            probes: Vec::new(),
+            times_to_errors: Vec::new(),
+        }
+    }
+
     #[test]
-    fn peers_reach_an_error_at_their_cheapest_step_or_never() {
-        let step = |step_voxels: f64, rows: Vec<Measured>| StepReport { step_voxels, rows, ratios: Vec::new() };
+    fn peers_reach_an_error_at_their_cheapest_step_or_say_why_not() {
         // Of `a`, step 1 is cheaper than step 2: the cheapest step counts, not the largest.
-        let steps = [
-            step(0.5, vec![row("a", 0.5, 40.0, 9e-5), row("b", 0.5, 30.0, 1.7e-3)]),
-            step(1.0, vec![row("a", 1.0, 20.0, 8e-4), row("b", 1.0, 20.0, 1.6e-3)]),
-            step(2.0, vec![row("a", 2.0, 25.0, 9e-4)]),
+        let steps = vec![
+            vec![row("a", 0.5, 40.0, 9e-5), row("b", 0.5, 30.0, 1.5e-3), row("c", 0.5, 9.0, 5e-4)],
+            vec![row("a", 1.0, 20.0, 8e-4), row("b", 1.0, 20.0, 1.6e-3), row("c", 1.0, 8.0, 2e-3)],
+            vec![row("a", 2.0, 25.0, 9e-4), row("b", 2.0, 25.0, 9e-3)],
         ];
-        let found = times_to_errors(&steps);
+        let mut scene = scene(&["a", "b", "c", "d"], steps);
+        scene.contestants[3].absent = Some("no module".to_owned());
+        scene.probes.push(Probe { contestant: "c".to_owned(), step_voxels: 0.25, rmse: 1.3e-4 });
         let words: Vec<String> =
-            found.iter().map(|t| format!("{} {:e} {}", t.contestant, t.bound, t.reached)).collect();
+            times_to_errors(&scene).iter().map(|t| format!("{} {:e} {}", t.contestant, t.bound, t.reached)).collect();
         let expected = [
             "a 1e-3 step 1: 10.0 ms, CPU 20.0 ms",
             "a 1e-4 step 1/2: 20.0 ms, CPU 40.0 ms",
-            "b 1e-3 never (least error 1.60e-3)",
-            "b 1e-4 never (least error 1.60e-3)",
+            "b 1e-3 never: it stays at 1.50e-3 from step 1 on",
+            "b 1e-4 never: it stays at 1.50e-3 from step 1 on",
+            "c 1e-3 step 1/2: 4.5 ms, CPU 9.0 ms",
+            "c 1e-4 not by step 1/4: 1.30e-4",
+            "d 1e-3 absent, or failed",
+            "d 1e-4 absent, or failed",
         ];
         assert_eq!(words, expected);
+    }
+
+    #[test]
+    fn peers_errors_stay_only_where_small_steps_say_so() {
+        let standing = |points: &[(f64, f64)]| {
+            Standing::of(&scene(&["a"], points.iter().map(|(step, e)| vec![row("a", *step, 1.0, *e)]).collect()), "a")
+        };
+        assert!(standing(&[]).may_fall() && standing(&[(1.0, 1e-3)]).may_fall());
+        // Half the step: order 1 falls, whatever the order of the steps; an eighth less does not, and more does not.
+        assert!(standing(&[(0.25, 1e-3), (0.5, 2e-3)]).may_fall());
+        assert_eq!(standing(&[(0.5, 8e-3), (0.25, 7e-3)]).stays_from(), Some(0.5));
+        assert_eq!(standing(&[(1.0, 8e-3), (0.5, 9e-3)]).stays_from(), Some(1.0));
+        // The same errors, of steps that are near to each other, and of steps of voxels.
+        assert!(standing(&[(0.3, 8e-3), (0.25, 7e-3)]).may_fall());
+        assert!(standing(&[(2.0, 8e-3), (1.0, 7.9e-3)]).may_fall());
     }
 }
