@@ -7,6 +7,7 @@ mod content;
 mod facets;
 mod feature;
 mod field;
+mod knot_table;
 mod lighting;
 mod mesh;
 mod packed;
@@ -41,6 +42,7 @@ pub use field::{
     IndexLattice, Join, Packing, Places, Reach, Room, RoomChange, SampleFormat, Slots, SlotsError, TextureLayout,
     TextureShape,
 };
+pub use knot_table::KnotTable;
 pub use lighting::{LightUniform, Lighting};
 pub use mesh::{
     Coloring, Mesh, MeshBackend, MeshError, MeshFrame, MeshLines, MeshPlan, MeshPlanError, MeshShading, MeshTriangle,

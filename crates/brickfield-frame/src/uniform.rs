@@ -6,7 +6,7 @@ use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_core::{Knot, Place, TransferFunction};
 use bytemuck::{Pod, Zeroable};
 
-use crate::{AtlasShape, CellsPlan, FramePlan, Handedness, Pass, Sampling, ValueScale};
+use crate::{AtlasShape, CellsPlan, FramePlan, Handedness, KnotTable, Pass, Sampling, ValueScale};
 
 /// The frame's uniform block: vectors of three, each followed by an unrelated number. Positions are in
 /// sample space relative to `RayFrame::center`.
@@ -79,12 +79,12 @@ pub struct FrameUniforms {
     pub spread_scale: f32,
     /// The first that rays towards smaller coordinates meet.
     pub planes_high: [f32; 3],
-    /// Nothing.
-    pub padding_2: f32,
+    /// Bins of the [`KnotTable`] per number of the value scale.
+    pub bins_per_value: f32,
     /// Distance between planes a voxel apart, in world units.
     pub voxel_world: [f32; 3],
     /// Nothing.
-    pub padding_3: f32,
+    pub padding: f32,
     /// Width and height of the picture.
     pub size: [u32; 2],
     /// First row of the pass.
@@ -114,8 +114,8 @@ pub struct KnotUniform {
     pub value: f32,
     /// Reciprocal of the distance to the next knot (0 at the last and before a jump's second knot).
     pub per_value: f32,
-    /// Nothing.
-    pub padding: [f32; 2],
+    /// Knots where searches in bins 2 i and 2 i + 1 of a [`KnotTable`] begin; i is this knot's number.
+    pub begins: [f32; 2],
 }
 
 /// A [`Place`] as shaders read it.
@@ -184,8 +184,8 @@ impl FrameUniforms {
             voxel_world: float3(rays.planes.voxel_world),
             dense_stride: field.dense_level().map_or(1.0, |level| level.stride() as f32),
             spread_scale: plan.spreads().map_or(0.0, |slots| (slots.decode().scale / plan.value_scale().unit()) as f32),
-            padding_2: 0.0,
-            padding_3: 0.0,
+            bins_per_value: KnotTable::of(&plan.transfer, plan.value_scale()).bins_per_value(),
+            padding: 0.0,
             goes_on: 0,
             seen_row: 0,
         }
@@ -224,6 +224,7 @@ impl FrameUniforms {
             counted_from,
             index_dims: cells.n_cells().to_array(),
             n_knots: plan.transfer().knots().len() as u32,
+            bins_per_value: KnotTable::of(plan.transfer(), values).bins_per_value(),
             voxel_world: [unit as f32, handedness, 0.0],
             size: rays.size.to_array(),
             ..FrameUniforms::zeroed()
@@ -266,7 +267,10 @@ impl KnotUniform {
             Some(next) if next.value > knots[i].value => values.unit() / (next.value - knots[i].value),
             _ => 0.0,
         };
-        knots.iter().enumerate().map(|(i, k)| knot(k, values.number(k.value), reciprocal(i))).collect()
+        let table = KnotTable::of(transfer, values);
+        let begins = table.begins().chunks_exact(2).map(|bins| [bins[0] as f32, bins[1] as f32]);
+        let knots = knots.iter().enumerate().map(|(i, k)| knot(k, values.number(k.value), reciprocal(i)));
+        knots.zip(begins).map(|(knot, begins)| KnotUniform { begins, ..knot }).collect()
     }
 }
 
@@ -314,7 +318,7 @@ impl SampleScale {
 fn knot(k: &Knot, value: f64, per_value: f64) -> KnotUniform {
     let [r, g, b] = k.color.map(|c| c as f32);
     let optics = [r, g, b, k.extinction as f32];
-    KnotUniform { optics, value: value as f32, per_value: per_value as f32, padding: [0.0; 2] }
+    KnotUniform { optics, value: value as f32, per_value: per_value as f32, begins: [0.0; 2] }
 }
 
 fn float3(v: DVec3) -> [f32; 3] {

@@ -124,7 +124,7 @@ fn rounds_of_knots(rule: QuadratureRule, n_knots: usize, search: KnotSearch) -> 
     let n_knots = n_knots as f64;
     let pieces = if rule == QuadratureRule::PreIntegrated { n_knots + 1.0 } else { 0.0 };
     match search {
-        KnotSearch::Unrolled(_) => pieces,
+        KnotSearch::Unrolled(_) | KnotSearch::Table(_) => pieces,
         KnotSearch::Loop => pieces + (n_knots.log2() + 1.0).floor() * rule.nodes().len() as f64,
     }
 }

@@ -1,9 +1,9 @@
 //! Which shader a plan needs.
 
-use brickfield_core::Interblock;
+use brickfield_core::{Interblock, TransferFunction};
 use brickfield_frame::{
-    CellsPlan, CellsShading, Coloring, Division, FEW_KNOTS, Feature, FeatureSet, Fetch, FramePlan, Join, Lengths,
-    MeshShading, Placement, Places, QuadratureRule, ShaderFunction, Slices,
+    CellsPlan, CellsShading, Coloring, Division, FEW_KNOTS, Feature, FeatureSet, Fetch, FramePlan, Join, KnotTable,
+    Lengths, MeshShading, Placement, Places, QuadratureRule, ShaderFunction, Slices, ValueScale,
 };
 
 use crate::passes::has_long_rays;
@@ -164,6 +164,9 @@ const READS_FIELD: [Feature; 4] = [Feature::TransferLookup, Feature::SkipEmpty, 
 pub enum KnotSearch {
     /// So many halvings, at most [`KnotSearch::MOST_HALVINGS`]; 0 where there is one knot.
     Unrolled(u8),
+    /// From where a [`KnotTable`] says on, so many knots further, at most [`KnotSearch::MOST_STEPS`]; of as many knots as unrolled halvings
+    /// tell apart.
+    Table(u8),
     /// A loop, for more knots.
     Loop,
 }
@@ -172,7 +175,10 @@ impl KnotSearch {
     /// Most halvings that are unrolled: they tell 256 knots apart.
     pub const MOST_HALVINGS: u8 = 8;
 
-    /// The search that tells `n_knots` apart.
+    /// Most steps from where a table says.
+    pub const MOST_STEPS: u8 = 3;
+
+    /// The search that tells `n_knots` apart, wherever they lie.
     pub fn among(n_knots: usize) -> KnotSearch {
         let halvings = n_knots.max(1).next_power_of_two().trailing_zeros() as u8;
         if halvings <= KnotSearch::MOST_HALVINGS { KnotSearch::Unrolled(halvings) } else { KnotSearch::Loop }
@@ -181,14 +187,25 @@ impl KnotSearch {
     /// The search that a plan needs.
     pub fn of(plan: &FramePlan) -> KnotSearch {
         match plan.features().contains(Feature::TransferLookup) {
-            true => KnotSearch::among(plan.transfer().knots().len()),
+            true => KnotSearch::of_transfer(plan.transfer(), plan.value_scale()),
             false => KnotSearch::Unrolled(0),
         }
     }
 
+    /// The search that reads fewest knots.
+    fn of_transfer(transfer: &TransferFunction, values: ValueScale) -> KnotSearch {
+        let halving = KnotSearch::among(transfer.knots().len());
+        let KnotSearch::Unrolled(halvings) = halving else { return halving };
+        let steps = KnotTable::of(transfer, values).most_steps();
+        // The table itself is read once.
+        let is_shorter = !halving.is_of_few() && steps + 1 < u32::from(halvings);
+        if is_shorter && steps <= u32::from(KnotSearch::MOST_STEPS) { KnotSearch::Table(steps as u8) } else { halving }
+    }
+
     /// All searches.
     pub fn all() -> impl Iterator<Item = KnotSearch> {
-        (0..=KnotSearch::MOST_HALVINGS).map(KnotSearch::Unrolled).chain([KnotSearch::Loop])
+        let tables = (1..=KnotSearch::MOST_STEPS).map(KnotSearch::Table);
+        (0..=KnotSearch::MOST_HALVINGS).map(KnotSearch::Unrolled).chain(tables).chain([KnotSearch::Loop])
     }
 
     /// Whether shaders compare with every knot.
@@ -199,7 +216,10 @@ impl KnotSearch {
     fn conditions(self) -> impl Iterator<Item = (String, bool)> {
         let unrolls = move |n| matches!(self, KnotSearch::Unrolled(halvings) if n <= halvings);
         let halvings = (1..=KnotSearch::MOST_HALVINGS).map(move |n| (format!("halvings_{n}"), unrolls(n)));
-        halvings.chain([("many_knots".to_owned(), self == KnotSearch::Loop)])
+        let goes_on = move |n| matches!(self, KnotSearch::Table(steps) if n <= steps);
+        let steps = (2..=KnotSearch::MOST_STEPS).map(move |n| (format!("steps_{n}"), goes_on(n)));
+        let kinds = [("knot_table", matches!(self, KnotSearch::Table(_))), ("many_knots", self == KnotSearch::Loop)];
+        halvings.chain(steps).chain(kinds.map(|(name, holds)| (name.to_owned(), holds)))
     }
 }
 
@@ -309,7 +329,7 @@ impl Variant {
             features = features.with(Feature::Lent);
         }
         let search = match self.search {
-            KnotSearch::Unrolled(_) => KnotSearch::Unrolled(KnotSearch::MOST_HALVINGS),
+            KnotSearch::Unrolled(_) | KnotSearch::Table(_) => KnotSearch::Unrolled(KnotSearch::MOST_HALVINGS),
             KnotSearch::Loop => KnotSearch::Loop,
         };
         match self.entry {
@@ -372,7 +392,7 @@ impl Variant {
         ];
         let features = needed.into_iter().filter_map(|(feature, is_needed)| is_needed.then_some(feature)).collect();
         let variant = Variant::new(features, plan.sampling().rule(), Entry::Cells(plan.shading()));
-        Variant { search: KnotSearch::among(n_knots), ..variant }
+        Variant { search: KnotSearch::of_transfer(plan.transfer(), plan.value_scale()), ..variant }
     }
 
     /// The conditions (`@if(name)`) that hold.

@@ -41,7 +41,7 @@ fn host_and_shader_structs_have_the_same_layout() {
         direction_down, domain_min, domain_max, visible_min, visible_max, first_sample, last_sample, index_origin,
         index_dims, atlas_bricks, planes_low, planes_high, voxel_world, size, facets_of_picture = facet_pixels));
     assert_rows();
-    assert_equal(&module, "Knot", host!(KnotUniform, optics, value, per_value, padding));
+    assert_equal(&module, "Knot", host!(KnotUniform, optics, value, per_value, begins));
     #[rustfmt::skip]
     assert_equal(&module, "Light", host!(LightUniform, steepness_x, steepness_y, steepness_z, world_x, world_y, world_z, source,
         ambient, diffuse, specular, shininess, greatest_slope, back));
@@ -105,6 +105,8 @@ fn assert_rows() {
         brick_samples,
         planes_low,
         spread_scale,
+        planes_high,
+        bins_per_value,
         size,
         first_row,
         beam_pixels,
@@ -120,7 +122,7 @@ fn assert_rows() {
     let library = brickfield_shaders::ShaderLibrary::embedded();
     let (_, text) = library.modules().find(|(name, _)| *name == "frame").unwrap();
     let functions: Vec<&str> = text.split("\nfn ").skip(1).filter(|f| f.contains("return frame.")).collect();
-    assert_eq!(functions.len(), 22);
+    assert_eq!(functions.len(), 23);
     for function in functions {
         let name = function.split('(').next().unwrap();
         let read = function.split("return frame.").nth(1).unwrap().split(';').next().unwrap();

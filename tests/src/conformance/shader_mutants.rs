@@ -89,6 +89,9 @@ mutants! {
     PIECE_MEAN: "piece-mean", "preintegrated", "linear_piece", "(2.0 * near.w + far.w) / (3.0 * max(total, 1e-37))" => "0.5";
     /// The transfer function is continuous from the left.
     LEFT_CONTINUOUS: "left-continuous", "transfer", "is_from", "knot <= value" => "knot < value";
+    /// The search for a knot begins two bins further.
+    BIN_BEYOND: "bin-beyond", "transfer", "knot_below", "value * bins_per_value(), value > 0.0"
+        => "value * bins_per_value() + 2.0, value > 0.0";
     /// The transfer function goes on beyond its last knot.
     NOT_CONSTANT_OUTSIDE: "not-constant-outside", "transfer", "at_place", "clamp((value - line.value) * line.per_value, 0.0, 1.0)"
         => "(value - line.value) * line.per_value";

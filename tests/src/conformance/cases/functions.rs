@@ -98,11 +98,11 @@ fn rugged() -> TransferFunction {
     TransferFunction::new(knots).expect("knots ascend")
 }
 
-/// More knots than a short search has halvings for, a jump among them.
-fn many_knots() -> TransferFunction {
+/// Even knots, a jump among them: 241 are found by a table, 400 by a loop.
+fn even_knots(n: u32) -> TransferFunction {
     let value = |i: u32| f64::from(if i == 200 { 199 } else { i }) * 0.01;
     let wave = |i: u32| 0.5 + 0.5 * (0.7 * f64::from(i)).sin();
-    let knots = (0..400u32).map(|i| knot(value(i), 2.0 * wave(i), [wave(i + 1), wave(i + 2), wave(i + 3)]));
+    let knots = (0..n).map(|i| knot(value(i), 2.0 * wave(i), [wave(i + 1), wave(i + 2), wave(i + 3)]));
     TransferFunction::new(knots.collect()).expect("knots ascend")
 }
 
@@ -171,7 +171,14 @@ fn classifications() -> Vec<Case> {
         case("function/classify-constant", catches![ExtinctionScaled, RedBlueSwapped], || {
             TransferFunction::constant(0.7, COOL).expect("a constant")
         }),
-        case("function/classify-many-knots", catches![KnotMoved, shader::STEPS, shader::LEFT_CONTINUOUS], many_knots),
+        case("function/classify-many-knots", catches![KnotMoved, shader::STEPS, shader::LEFT_CONTINUOUS], || {
+            even_knots(400)
+        }),
+        case(
+            "function/classify-table",
+            catches![KnotMoved, shader::STEPS, shader::LEFT_CONTINUOUS, shader::BIN_BEYOND],
+            || even_knots(241),
+        ),
         case("function/classify-steep", catches![ExtinctionScaled, shader::STEPS], || {
             TransferFunction::new(vec![knot(0.0, 0.0, WARM), knot(1.0, 1e12, COOL)]).expect("knots ascend")
         }),
