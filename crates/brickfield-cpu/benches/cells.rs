@@ -105,15 +105,18 @@ fn difference(plan: &CellsPlan) {
     let expected = discrete_cells(plan);
     let seconds = begin.elapsed().as_secs_f64();
     let got = CpuBackend::new().render_cells(plan).expect("a picture").image;
-    let both = got.pixels().iter().zip(expected.image.pixels());
-    let off =
-        |(a, b): (&[f32; 4], &[f64; 4])| a.iter().zip(b).map(|(a, b)| (f64::from(*a) - b).abs()).fold(0.0, f64::max);
-    let mut off: Vec<f64> = both.map(off).collect();
-    let beyond = off.iter().zip(&expected.ambiguity).map(|(d, a)| d - a).fold(0.0, f64::max);
+    let pairs = got.pixels().iter().zip(expected.image.pixels()).zip(&expected.ambiguity);
+    let off = |((a, b), ambiguity): ((&[f32; 4], &[f64; 4]), &f64)| {
+        let off = a.iter().zip(b).map(|(a, b)| (f64::from(*a) - b).abs()).fold(0.0, f64::max);
+        (a[3] > 0.0 || b[3] > 0.0).then_some((off, off - ambiguity))
+    };
+    let (mut off, beyond): (Vec<f64>, Vec<f64>) = pairs.filter_map(off).unzip();
+    let beyond = beyond.into_iter().fold(0.0, f64::max);
     off.sort_by(f64::total_cmp);
     let at = |part: f64| off[((off.len() - 1) as f64 * part) as usize];
     println!(
-        "  {} nodes in {} cells; from the f64 answer ({seconds:.1} s): median {:.1e}, 99.9 % {:.1e}, most {:.1e}, beyond ambiguity {beyond:.1e}",
+        "  {} pixels, {} nodes in {} cells; from the f64 answer ({seconds:.1} s): median {:.1e}, 99.9 % {:.1e}, most {:.1e}, beyond ambiguity {beyond:.1e}",
+        off.len(),
         expected.n_samples,
         expected.n_cells,
         at(0.5),
