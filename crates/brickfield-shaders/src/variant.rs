@@ -448,11 +448,28 @@ fn condition_of_rule(rule: QuadratureRule) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use brickfield_core::Knot;
+    use brickfield_frame::Decode;
 
     #[test]
     fn a_search_tells_its_knots_apart() {
         let expected = [(0, 0), (1, 0), (2, 1), (3, 2), (4, 2), (5, 3), (256, 8)];
         assert!(expected.iter().all(|(n, halvings)| KnotSearch::among(*n) == KnotSearch::Unrolled(*halvings)));
         assert_eq!(KnotSearch::among(257), KnotSearch::Loop);
+    }
+
+    #[test]
+    fn a_table_is_taken_where_it_reads_fewer_knots() {
+        let search = |n: u32, value: fn(u32) -> f64| {
+            let knot = |i| Knot { value: value(i), extinction: 0.0, color: [0.0; 3] };
+            let transfer = TransferFunction::new((0..n).map(knot).collect()).unwrap();
+            KnotSearch::of_transfer(&transfer, ValueScale::of(&transfer, Decode { scale: 1.0, offset: 0.0 }))
+        };
+        assert_eq!(search(8, f64::from), KnotSearch::Unrolled(3));
+        assert_eq!((search(9, f64::from), search(256, f64::from)), (KnotSearch::Table(1), KnotSearch::Table(1)));
+        assert_eq!(search(17, |i| f64::from(if i == 8 { 7 } else { i })), KnotSearch::Table(2));
+        // Four knots in the first bin; more than are unrolled.
+        assert_eq!(search(40, |i| f64::from(i).powi(2)), KnotSearch::Unrolled(6));
+        assert_eq!(search(257, f64::from), KnotSearch::Loop);
     }
 }
