@@ -34,18 +34,16 @@ impl KnotTable {
 
     /// The table of knots that have these values, in ascending order, of which the first is 0.
     fn new(knots: &[f32]) -> KnotTable {
-        let (n_bins, extent) = (2 * knots.len(), f64::from(knots.last().copied().unwrap_or_default()));
-        let width = extent / n_bins.saturating_sub(1).max(1) as f64;
-        let bins_per_value = (1.0 / width) as f32;
-        if !bins_per_value.is_normal() {
+        let n_bins = 2 * knots.len();
+        let width = width(knots.len(), f64::from(knots.last().copied().unwrap_or_default()));
+        let bins_per_value = reciprocal(width);
+        if bins_per_value == 0.0 {
             let most_steps = knots.len().saturating_sub(1) as u32;
-            return KnotTable { begins: vec![0; n_bins], bins_per_value: 0.0, most_steps };
+            return KnotTable { begins: vec![0; n_bins], bins_per_value, most_steps };
         }
-        // The last knot at or below the lower end of a bin.
-        let last_below =
-            |bin: f64| knots.partition_point(|knot| f64::from(*knot) <= bin * width).saturating_sub(1) as u32;
-        let begins: Vec<u32> = (0..n_bins).map(|bin| last_below(bin as f64 - MARGIN)).collect();
-        let ends = (1..n_bins).map(|bin| last_below(bin as f64 + MARGIN)).chain([knots.len() as u32 - 1]);
+        let begins: Vec<u32> = last_below(knots, (0..n_bins).map(|bin| (bin as f64 - MARGIN) * width)).collect();
+        let ends = last_below(knots, (1..n_bins).map(|bin| (bin as f64 + MARGIN) * width));
+        let ends = ends.chain([knots.len() as u32 - 1]);
         let most_steps = begins.iter().zip(ends).map(|(begin, end)| end - begin).max().unwrap_or_default();
         KnotTable { begins, bins_per_value, most_steps }
     }
@@ -60,10 +58,39 @@ impl KnotTable {
         self.bins_per_value
     }
 
+    /// The same of a transfer function's table, which is not made.
+    pub(crate) fn bins_per_value_of(transfer: &TransferFunction, values: ValueScale) -> f32 {
+        let knots = transfer.knots();
+        let last = knots.last().map_or(0.0, |knot| values.number(knot.value) as f32);
+        reciprocal(width(knots.len(), f64::from(last)))
+    }
+
     /// How many knots a search goes on, at most.
     pub fn most_steps(&self) -> u32 {
         self.most_steps
     }
+}
+
+/// The width of a bin, of `n_knots` knots from 0 to `last`: the last bin begins at the last knot.
+fn width(n_knots: usize, last: f64) -> f64 {
+    last / (2 * n_knots).saturating_sub(1).max(1) as f64
+}
+
+/// 0 if it is no normal number.
+fn reciprocal(width: f64) -> f32 {
+    let reciprocal = (1.0 / width) as f32;
+    if reciprocal.is_normal() { reciprocal } else { 0.0 }
+}
+
+/// The last knot at or below each of some values in ascending order, or the first knot.
+fn last_below(knots: &[f32], values: impl Iterator<Item = f64>) -> impl Iterator<Item = u32> {
+    let mut last = 0;
+    values.map(move |value| {
+        while knots.get(last + 1).is_some_and(|knot| f64::from(*knot) <= value) {
+            last += 1;
+        }
+        last as u32
+    })
 }
 
 #[cfg(test)]

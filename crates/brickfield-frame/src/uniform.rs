@@ -184,7 +184,7 @@ impl FrameUniforms {
             voxel_world: float3(rays.planes.voxel_world),
             dense_stride: field.dense_level().map_or(1.0, |level| level.stride() as f32),
             spread_scale: plan.spreads().map_or(0.0, |slots| (slots.decode().scale / plan.value_scale().unit()) as f32),
-            bins_per_value: KnotTable::of(&plan.transfer, plan.value_scale()).bins_per_value(),
+            bins_per_value: KnotTable::bins_per_value_of(&plan.transfer, plan.value_scale()),
             padding: 0.0,
             goes_on: 0,
             seen_row: 0,
@@ -224,7 +224,7 @@ impl FrameUniforms {
             counted_from,
             index_dims: cells.n_cells().to_array(),
             n_knots: plan.transfer().knots().len() as u32,
-            bins_per_value: KnotTable::of(plan.transfer(), values).bins_per_value(),
+            bins_per_value: KnotTable::bins_per_value_of(plan.transfer(), values),
             voxel_world: [unit as f32, handedness, 0.0],
             size: rays.size.to_array(),
             ..FrameUniforms::zeroed()

@@ -1,5 +1,5 @@
-//! How far a picture lies beside its answer: a volume that is half a voxel off, or pixels that are sampled at their corners, have
-//! errors that a small step does not lower, but that are no larger than those of a steep transfer function.
+//! How far a picture lies beside its answer. The errors of a volume half a voxel off, or of pixels sampled at their corners, are no
+//! larger than the errors of a steep transfer function, but small steps do not lower them.
 
 use brickfield::core::Image;
 use brickfield::core::glam::{DMat2, DVec2};

@@ -34,7 +34,7 @@ pub(super) fn descend(measuring: &mut Measuring, say: &mut dyn FnMut(&str)) -> R
         let arrived: Vec<String> =
             found.filter(|p| arrives(&p.contestant, p.rmse)).map(|p| p.contestant.clone()).collect();
         if !arrived.is_empty() {
-            measuring.step(step, &mut |name| arrived.iter().any(|a| a == name), say)?;
+            measuring.step(step, &|name| arrived.iter().any(|a| a == name), say)?;
         }
         step *= 0.5;
     }

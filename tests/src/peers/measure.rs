@@ -19,8 +19,7 @@ use crate::compare::rivals::Rivals;
 use crate::report::BackendInfo;
 use crate::turns::{Spread, take_turns};
 
-/// Rounds of a step that are not timed: a frame of a camera that looks from elsewhere, then the picture. A contestant that draws
-/// what it drew before shows the wrong picture.
+/// Untimed rounds of a step: a frame by a camera elsewhere, then the picture. With a stuck camera a contestant shows the wrong picture.
 const WARM_UP: u32 = 2;
 /// How far the camera of the first round is turned.
 const ELSEWHERE_DEGREES: f64 = 30.0;
@@ -125,7 +124,7 @@ pub(super) fn scene(
     let exhibit = Exhibit::new(args, subject)?;
     let mut measuring = Measuring::new(args, lineup, &exhibit, say)?;
     for step in &args.steps {
-        measuring.step(*step, &mut |_| true, say)?;
+        measuring.step(*step, &|_| true, say)?;
     }
     if args.to_error {
         descent::descend(&mut measuring, say)?;
@@ -166,7 +165,7 @@ impl<'a> Measuring<'a> {
     pub(super) fn step(
         &mut self,
         step_voxels: f64,
-        is_timed: &mut dyn FnMut(&str) -> bool,
+        is_timed: &dyn Fn(&str) -> bool,
         say: &mut dyn FnMut(&str),
     ) -> Result<(), PeersError> {
         let Measuring { args, exhibit, present, answers, page, report } = self;

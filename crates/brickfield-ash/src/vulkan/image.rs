@@ -25,7 +25,7 @@ pub(crate) struct VulkanImage {
     pub(super) raw: vk::Image,
     pub(super) view: vk::ImageView,
     extent: UVec3,
-    layout: TextureLayout,
+    view_type: vk::ImageViewType,
     device: Arc<Device>,
     /// Dropped after the image is destroyed.
     memory: Option<Allocation>,
@@ -85,18 +85,14 @@ impl VulkanImage {
         info: vk::ImageCreateInfo<'_>,
         extent: UVec3,
     ) -> Result<VulkanImage, RenderError> {
-        let layout = match view_type {
-            vk::ImageViewType::TYPE_2D_ARRAY => TextureLayout::Layers,
-            _ => TextureLayout::Volume,
-        };
-        let (axes, layers) = axes_and_layers(layout, extent);
+        let (axes, layers) = axes_and_layers(view_type, extent);
         let info =
             info.extent(extent_3d(axes)).mip_levels(1).array_layers(layers).samples(vk::SampleCountFlags::TYPE_1);
         // SAFETY: callers keep the extent within the device's limits and the format within its features.
         let raw = unsafe { device.raw().create_image(&info, None) }
             .map_err(|code| refused("vkCreateImage", code, what, n_bytes, None))?;
         let mut image =
-            VulkanImage { raw, view: vk::ImageView::null(), extent, layout, device: device.clone(), memory: None };
+            VulkanImage { raw, view: vk::ImageView::null(), extent, view_type, device: device.clone(), memory: None };
         // SAFETY: the image is new.
         let required = unsafe { device.raw().get_image_memory_requirements(raw) };
         let memory = image.memory.insert(Allocation::new(device, what, required, Residence::Device)?);
@@ -123,10 +119,10 @@ impl VulkanImage {
         origin: UVec3,
         extent: UVec3,
     ) -> (vk::ImageSubresourceLayers, vk::Offset3D, vk::Extent3D) {
-        let (axes, layer_count) = axes_and_layers(self.layout, extent);
-        let (first, base_array_layer) = match self.layout {
-            TextureLayout::Volume => (origin, 0),
-            TextureLayout::Layers => (origin.with_z(0), origin.z),
+        let (axes, layer_count) = axes_and_layers(self.view_type, extent);
+        let (first, base_array_layer) = match self.view_type {
+            vk::ImageViewType::TYPE_2D_ARRAY => (origin.with_z(0), origin.z),
+            _ => (origin, 0),
         };
         let aspect_mask = vk::ImageAspectFlags::COLOR;
         let layers = vk::ImageSubresourceLayers { aspect_mask, mip_level: 0, base_array_layer, layer_count };
@@ -180,10 +176,10 @@ impl Drop for Sampler {
 }
 
 /// The axes of an image of so many texels, and its layers.
-fn axes_and_layers(layout: TextureLayout, extent: UVec3) -> (UVec3, u32) {
-    match layout {
-        TextureLayout::Volume => (extent, 1),
-        TextureLayout::Layers => (extent.with_z(1), extent.z),
+fn axes_and_layers(view_type: vk::ImageViewType, extent: UVec3) -> (UVec3, u32) {
+    match view_type {
+        vk::ImageViewType::TYPE_2D_ARRAY => (extent.with_z(1), extent.z),
+        _ => (extent, 1),
     }
 }
 

@@ -26,122 +26,122 @@ pub(super) struct Batch<'a, const L: usize> {
 }
 
 impl<const L: usize> Batch<'_, L> {
-    /// Puts the segments behind what has been seen so far. One function for bricks of all kinds: what is inlined below it would take minutes to
-    /// compile for each of them.
+    /// Puts the segments behind the ray's sums. Compiled once for bricks of all kinds: inlined into each, the functions below would take minutes
+    /// to compile.
     #[inline(never)]
     pub(super) fn push(self, simd: pulp::Arch, state: &mut Ray32) {
         simd.dispatch(
             #[inline(always)]
-            || {
-                let Batch { rule, transfer, near, far, n, length } = self;
-                match far {
-                    None => one_node(rule, transfer, near, n, length, state),
-                    Some(far) => two_nodes(rule, transfer, (near, far), n, length, state),
-                }
+            || match self.far {
+                None => self.one_node(state),
+                Some(far) => self.two_nodes(far, state),
             },
         );
     }
-}
 
-/// The first `n` segments of a rule with one node, from the values there (the last of them in the lanes behind).
-#[inline(always)]
-fn one_node<const L: usize>(
-    rule: QuadratureRule,
-    transfer: &Classifier,
-    values: &[f32; L],
-    n: usize,
-    length: f32,
-    state: &mut Ray32,
-) {
-    let (low, high) = extent(values);
-    let first = transfer.stretch(low);
-    let mut last = first;
-    while last < first + FEW_STRETCHES && high >= transfer.end(last) && transfer.end(last) < f32::INFINITY {
-        last += 1;
-    }
-    if high >= transfer.end(last) {
-        return mixed(rule, transfer, values, n, length, state);
-    }
-    match (last - first, transfer.is_dark(first)) {
-        (0, true) => {}
-        (0, false) => linear(rule, transfer.linear(first), values, n, length, state),
-        _ => neighbours(rule, transfer, first..=last, values, n, length, state),
-    }
-}
-
-/// The first `n` segments of a rule with two nodes, from the values there (the last of them in the lanes behind).
-#[inline(always)]
-fn two_nodes<const L: usize>(
-    rule: QuadratureRule,
-    transfer: &Classifier,
-    (near, far): (&[f32; L], &[f32; L]),
-    n: usize,
-    length: f32,
-    state: &mut Ray32,
-) {
-    let ((a, b), (c, d)) = (extent(near), extent(far));
-    let stretch = transfer.stretch(a.min(c));
-    if b.max(d) < transfer.end(stretch) && transfer.is_dark(stretch) {
-        return;
-    }
-    for (a, b) in near.iter().zip(far).take(n) {
-        state.push(segment(rule, transfer, [Some(*a), Some(*b)], length));
-    }
-}
-
-/// Segments whose values all lie in one stretch of the transfer function.
-///
-/// The colours' sum needs two sums only: of the weights of the stretch's lower end and of its upper.
-#[inline(always)]
-fn linear<const L: usize>(
-    rule: QuadratureRule,
-    stretch: &Stretch,
-    values: &[f32; L],
-    n: usize,
-    length: f32,
-    state: &mut Ray32,
-) {
-    let (mut place, mut depth) = ([0f32; L], [0f32; L]);
-    for l in 0..L {
-        place[l] = stretch.place(values[l]);
-        depth[l] = stretch.extinction(place[l]) * length;
-    }
-    let weight = weights(rule, depth, n, state);
-    let (low, high) = sums(&weight, &place);
-    add(state, stretch.rgba(low, high));
-}
-
-/// Segments whose values lie in some neighbouring stretches: all of them are looked at in each.
-#[inline(always)]
-fn neighbours<const L: usize>(
-    rule: QuadratureRule,
-    transfer: &Classifier,
-    stretches: RangeInclusive<usize>,
-    values: &[f32; L],
-    n: usize,
-    length: f32,
-    state: &mut Ray32,
-) {
-    // Red, green, blue, extinction.
-    let mut optics = [[0f32; L]; 4];
-    for i in stretches.clone() {
-        let stretch = transfer.linear(i);
-        // Those beyond it are overwritten by its successor.
-        let begin = if i == *stretches.start() { f32::NEG_INFINITY } else { transfer.end(i - 1) };
-        let (mut place, mut is_there) = ([0f32; L], [0u32; L]);
-        for l in 0..L {
-            place[l] = stretch.place(values[l]);
-            is_there[l] = mask(values[l] >= begin);
+    #[inline(always)]
+    fn one_node(&self, state: &mut Ray32) {
+        let transfer = self.transfer;
+        let (low, high) = extent(self.near);
+        let first = transfer.stretch(low);
+        let mut last = first;
+        while last < first + FEW_STRETCHES && high >= transfer.end(last) && transfer.end(last) < f32::INFINITY {
+            last += 1;
         }
-        for (channel, optics) in optics.iter_mut().enumerate() {
+        if high >= transfer.end(last) {
+            return self.mixed(state);
+        }
+        match (last - first, transfer.is_dark(first)) {
+            (0, true) => {}
+            (0, false) => self.linear(transfer.linear(first), state),
+            _ => self.neighbours(first..=last, state),
+        }
+    }
+
+    #[inline(always)]
+    fn two_nodes(&self, far: &[f32; L], state: &mut Ray32) {
+        let ((a, b), (c, d)) = (extent(self.near), extent(far));
+        let stretch = self.transfer.stretch(a.min(c));
+        if b.max(d) < self.transfer.end(stretch) && self.transfer.is_dark(stretch) {
+            return;
+        }
+        for (a, b) in self.near.iter().zip(far).take(self.n) {
+            state.push(segment(self.rule, self.transfer, [Some(*a), Some(*b)], self.length));
+        }
+    }
+
+    /// Segments whose values all lie in one stretch of the transfer function.
+    ///
+    /// The colours' sum needs two sums only: of the weights of the stretch's lower end and of its upper.
+    #[inline(always)]
+    fn linear(&self, stretch: &Stretch, state: &mut Ray32) {
+        let (mut place, mut depth) = ([0f32; L], [0f32; L]);
+        for l in 0..L {
+            place[l] = stretch.place(self.near[l]);
+            depth[l] = stretch.extinction(place[l]) * self.length;
+        }
+        let weight = self.weights(depth, state);
+        let (low, high) = sums(&weight, &place);
+        add(state, stretch.rgba(low, high));
+    }
+
+    /// Segments whose values lie in some neighbouring stretches: all of them are looked at in each.
+    #[inline(always)]
+    fn neighbours(&self, stretches: RangeInclusive<usize>, state: &mut Ray32) {
+        // Red, green, blue, extinction.
+        let mut optics = [[0f32; L]; 4];
+        for i in stretches.clone() {
+            let stretch = self.transfer.linear(i);
+            // Those beyond it are overwritten by its successor.
+            let begin = if i == *stretches.start() { f32::NEG_INFINITY } else { self.transfer.end(i - 1) };
+            let (mut place, mut is_there) = ([0f32; L], [0u32; L]);
             for l in 0..L {
-                optics[l] = either(is_there[l], stretch.channel(channel, place[l]), optics[l]);
+                place[l] = stretch.place(self.near[l]);
+                is_there[l] = mask(self.near[l] >= begin);
+            }
+            for (channel, optics) in optics.iter_mut().enumerate() {
+                for l in 0..L {
+                    optics[l] = either(is_there[l], stretch.channel(channel, place[l]), optics[l]);
+                }
             }
         }
+        let [red, green, blue, extinction] = optics;
+        let weight = self.weights(extinction.map(|x| x * self.length), state);
+        add(state, [sum(&weight, &red), sum(&weight, &green), sum(&weight, &blue), sum(&weight, &[1.0; L])]);
     }
-    let [red, green, blue, extinction] = optics;
-    let weight = weights(rule, extinction.map(|x| x * length), n, state);
-    add(state, [sum(&weight, &red), sum(&weight, &green), sum(&weight, &blue), sum(&weight, &[1.0; L])]);
+
+    /// Segments whose values lie anywhere.
+    #[inline(always)]
+    fn mixed(&self, state: &mut Ray32) {
+        let (mut stretches, mut place, mut depth) = ([0usize; L], [0f32; L], [0f32; L]);
+        for l in 0..L {
+            stretches[l] = self.transfer.stretch(self.near[l]);
+            let stretch = self.transfer.linear(stretches[l]);
+            place[l] = stretch.place(self.near[l]);
+            depth[l] = stretch.extinction(place[l]) * self.length;
+        }
+        let weight = self.weights(depth, state);
+        let mut sum = [0f32; 4];
+        for l in 0..self.n {
+            let stretch = self.transfer.linear(stretches[l]);
+            let seen = stretch.rgba(weight[l] * (1.0 - place[l]), weight[l] * place[l]);
+            for (sum, x) in sum.iter_mut().zip(seen) {
+                *sum += x;
+            }
+        }
+        add(state, sum);
+    }
+
+    /// How much of the colour of each segment is seen, by their depths; the state keeps the light that passes the batch.
+    #[inline(always)]
+    fn weights(&self, depth: [f32; L], state: &mut Ray32) -> [f32; L] {
+        let mut weight = [0f32; L];
+        for (w, a) in weight.iter_mut().zip(opacities(self.rule, depth)).take(self.n) {
+            *w = state.transmittance as f32 * a;
+            state.transmittance *= 1.0 - f64::from(a);
+        }
+        weight
+    }
 }
 
 /// All bits of a word, or none: the compiler makes vectors of it, where it makes branches of `if`.
@@ -156,52 +156,12 @@ fn either(mask: u32, a: f32, b: f32) -> f32 {
     f32::from_bits((a.to_bits() & mask) | (b.to_bits() & !mask))
 }
 
-/// Segments whose values lie anywhere.
-#[inline(always)]
-fn mixed<const L: usize>(
-    rule: QuadratureRule,
-    transfer: &Classifier,
-    values: &[f32; L],
-    n: usize,
-    length: f32,
-    state: &mut Ray32,
-) {
-    let (mut stretches, mut place, mut depth) = ([0usize; L], [0f32; L], [0f32; L]);
-    for l in 0..L {
-        stretches[l] = transfer.stretch(values[l]);
-        let stretch = transfer.linear(stretches[l]);
-        place[l] = stretch.place(values[l]);
-        depth[l] = stretch.extinction(place[l]) * length;
-    }
-    let weight = weights(rule, depth, n, state);
-    let mut sum = [0f32; 4];
-    for l in 0..n {
-        let stretch = transfer.linear(stretches[l]);
-        let seen = stretch.rgba(weight[l] * (1.0 - place[l]), weight[l] * place[l]);
-        for (sum, x) in sum.iter_mut().zip(seen) {
-            *sum += x;
-        }
-    }
-    add(state, sum);
-}
-
 /// Adds what was seen of some segments.
 #[inline(always)]
 fn add(state: &mut Ray32, seen: [f32; 4]) {
     for (sum, x) in state.rgba.iter_mut().zip(seen) {
         *sum += f64::from(x);
     }
-}
-
-/// How much of the colour of each of the first `n` segments is seen, by their depths; what shines through the batch is left in the state.
-#[inline(always)]
-fn weights<const L: usize>(rule: QuadratureRule, depth: [f32; L], n: usize, state: &mut Ray32) -> [f32; L] {
-    let mut weight = [0f32; L];
-    for (w, a) in weight.iter_mut().zip(opacities(rule, depth)).take(n) {
-        *w = state.transmittance as f32 * a;
-        state.transmittance *= 1.0 - f64::from(a);
-    }
-    weight
 }
 
 #[inline(always)]
