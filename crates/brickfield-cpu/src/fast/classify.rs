@@ -3,6 +3,8 @@
 use brickfield_core::{Knot, TransferFunction};
 use brickfield_frame::ValueScale;
 
+use super::eight::{Eight, F32s, LANES, U32s};
+
 /// Extinction and straight colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Optics32 {
@@ -16,8 +18,9 @@ pub(crate) struct Stretch {
     start: f32,
     /// Reciprocal of the stretch's length; 0 where the function is constant.
     reciprocal: f32,
+    /// Red, green, blue and extinction at the lower end, and how much more they are at the upper.
     low: [f32; 4],
-    high: [f32; 4],
+    rise: [f32; 4],
 }
 
 /// A transfer function, ready for f32 look-up.
@@ -29,13 +32,63 @@ pub(crate) struct Classifier {
     stretches: Vec<Stretch>,
     /// The knots' values, and infinity.
     ends: Vec<f32>,
-    bins: [u32; N_BINS],
+    /// The stretches once more, if they are eight at most.
+    few: Option<FewStretches>,
+    bins: Box<[u32; N_BINS]>,
     bins_per_value: f32,
     /// How values are counted.
     pub(crate) values: ValueScale,
 }
 
-const N_BINS: usize = 256;
+/// Four times as many as transfer functions mostly have knots: the stretch that a bin names is mostly a value's, or the one before.
+const N_BINS: usize = 1024;
+
+/// Eight stretches, number by number, so that a register holds one number of all. Those that are left are as the last.
+#[derive(Clone, Debug)]
+struct FewStretches {
+    starts: [f32; LANES],
+    ends: [f32; LANES],
+    reciprocals: [f32; LANES],
+    low: [[f32; LANES]; 4],
+    rise: [[f32; LANES]; 4],
+}
+
+impl FewStretches {
+    fn new(stretches: &[Stretch], ends: &[f32]) -> Option<FewStretches> {
+        let last = stretches.len() - 1;
+        let number = |of: &dyn Fn(&Stretch) -> f32| std::array::from_fn(|i| of(&stretches[i.min(last)]));
+        (last < LANES).then(|| FewStretches {
+            starts: number(&|s| s.start),
+            ends: std::array::from_fn(|i| ends[i.min(last)]),
+            reciprocals: number(&|s| s.reciprocal),
+            low: std::array::from_fn(|c| number(&|s| s.low[c])),
+            rise: std::array::from_fn(|c| number(&|s| s.rise[c])),
+        })
+    }
+}
+
+/// The stretches of eight values.
+pub(super) struct Linear<V> {
+    pub(super) start: F32s<V>,
+    pub(super) end: F32s<V>,
+    reciprocal: F32s<V>,
+    low: [F32s<V>; 4],
+    rise: [F32s<V>; 4],
+}
+
+impl<V: Eight> Linear<V> {
+    /// Red, green, blue and extinction of values: at the stretches' ends, the limits from within.
+    #[inline(always)]
+    pub(super) fn at(&self, eight: V, values: F32s<V>) -> [F32s<V>; 4] {
+        let place = (values - self.start) * self.reciprocal;
+        let place = place.at_least(F32s::all(eight, 0.0)).at_most(F32s::all(eight, 1.0));
+        let mut optics = [place; 4];
+        for (c, x) in optics.iter_mut().enumerate() {
+            *x = place.times_plus(self.rise[c], self.low[c]);
+        }
+        optics
+    }
+}
 
 impl Classifier {
     pub(crate) fn new(transfer: &TransferFunction, values: ValueScale) -> Classifier {
@@ -52,7 +105,57 @@ impl Classifier {
         // One bin early, so that rounding cannot begin the search too late.
         let start = |bin: usize| (bin as f32 - 1.0) / bins_per_value;
         let bins = std::array::from_fn(|bin| ends.partition_point(|e| *e <= start(bin)) as u32);
-        Classifier { stretches, ends, bins, bins_per_value, values }
+        let few = FewStretches::new(&stretches, &ends);
+        Classifier { stretches, ends, few, bins: Box::new(bins), bins_per_value, values }
+    }
+
+    /// The stretches that eight values lie in; infinity and NaN are in the last.
+    #[inline(always)]
+    pub(super) fn stretches<V: Eight>(&self, eight: V, values: F32s<V>) -> U32s<V> {
+        if let Some(few) = &self.few {
+            // The last, less one for each end that a value lies before.
+            let mut at = U32s::all(eight, LANES as u32 - 1);
+            for end in &few.ends[..LANES - 1] {
+                at = at.less_one(values.is_less(F32s::all(eight, *end)));
+            }
+            return at;
+        }
+        let mut at = [0; LANES];
+        for (at, value) in at.iter_mut().zip(values.to_array()) {
+            *at = self.stretch(value) as u32;
+        }
+        U32s::new(eight, at)
+    }
+
+    /// Eight stretches.
+    #[inline(always)]
+    pub(super) fn linear<V: Eight>(&self, eight: V, at: U32s<V>) -> Linear<V> {
+        if let Some(few) = &self.few {
+            return Linear {
+                start: at.of(&few.starts),
+                end: at.of(&few.ends),
+                reciprocal: at.of(&few.reciprocals),
+                low: [at.of(&few.low[0]), at.of(&few.low[1]), at.of(&few.low[2]), at.of(&few.low[3])],
+                rise: [at.of(&few.rise[0]), at.of(&few.rise[1]), at.of(&few.rise[2]), at.of(&few.rise[3])],
+            };
+        }
+        let (mut starts, mut ends, mut reciprocals) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let (mut low, mut rise) = ([[0.0; LANES]; 4], [[0.0; LANES]; 4]);
+        for (l, i) in at.to_array().into_iter().enumerate() {
+            let stretch = &self.stretches[i as usize];
+            (starts[l], ends[l], reciprocals[l]) = (stretch.start, self.ends[i as usize], stretch.reciprocal);
+            for c in 0..4 {
+                (low[c][l], rise[c][l]) = (stretch.low[c], stretch.rise[c]);
+            }
+        }
+        let of = |x: [f32; LANES]| F32s::new(eight, x);
+        Linear {
+            start: of(starts),
+            end: of(ends),
+            reciprocal: of(reciprocals),
+            low: [of(low[0]), of(low[1]), of(low[2]), of(low[3])],
+            rise: [of(rise[0]), of(rise[1]), of(rise[2]), of(rise[3])],
+        }
     }
 
     /// Extinction and colour at a value; right-continuous at jumps.
@@ -67,6 +170,8 @@ impl Classifier {
         let value = value.min(f32::MAX);
         let bin = (value * self.bins_per_value).clamp(0.0, (N_BINS - 1) as f32) as usize;
         let mut i = self.bins[bin & (N_BINS - 1)] as usize;
+        // Mostly one step at most, without a branch.
+        i += usize::from(self.ends[i] <= value);
         while self.ends[i] <= value {
             i += 1;
         }
@@ -77,21 +182,10 @@ impl Classifier {
     #[inline(always)]
     pub(crate) fn on(&self, i: usize, value: f32) -> Optics32 {
         let s = &self.stretches[i];
-        let f = s.place(value);
-        let [r, g, b, _] = s.rgba(1.0 - f, f);
-        Optics32 { extinction: s.extinction(f), color: [r, g, b] }
-    }
-
-    /// Stretch `i`.
-    #[inline(always)]
-    pub(crate) fn linear(&self, i: usize) -> &Stretch {
-        &self.stretches[i]
-    }
-
-    /// Whether nothing of stretch `i` is visible.
-    #[inline(always)]
-    pub(crate) fn is_dark(&self, i: usize) -> bool {
-        self.stretches[i].low[3] + self.stretches[i].high[3] == 0.0
+        let place = (value - s.start) * s.reciprocal;
+        let place = if place > 0.0 { place.min(1.0) } else { 0.0 };
+        let at = |c: usize| s.low[c] + s.rise[c] * place;
+        Optics32 { extinction: at(3), color: [at(0), at(1), at(2)] }
     }
 
     /// The value at the lower end of stretch `i`, which is not the first.
@@ -107,37 +201,8 @@ impl Classifier {
     }
 }
 
-impl Stretch {
-    /// Where a value lies, from 0 at the lower end to 1 at the upper.
-    #[inline(always)]
-    pub(crate) fn place(&self, value: f32) -> f32 {
-        let f = (value - self.start) * self.reciprocal;
-        let f = if f > 0.0 { f } else { 0.0 };
-        if f < 1.0 { f } else { 1.0 }
-    }
-
-    /// Extinction at a place.
-    #[inline(always)]
-    pub(crate) fn extinction(&self, place: f32) -> f32 {
-        self.channel(3, place)
-    }
-
-    /// Red, green, blue or extinction at a place.
-    #[inline(always)]
-    pub(crate) fn channel(&self, i: usize, place: f32) -> f32 {
-        self.low[i] * (1.0 - place) + self.high[i] * place
-    }
-
-    /// The ends' colours with the given weights, and the weights' sum.
-    #[inline(always)]
-    pub(crate) fn rgba(&self, low: f32, high: f32) -> [f32; 4] {
-        let mix = |c: usize| self.low[c] * low + self.high[c] * high;
-        [mix(0), mix(1), mix(2), low + high]
-    }
-}
-
 fn constant(knot: &Knot, start: f32) -> Stretch {
-    Stretch { start, reciprocal: 0.0, low: rgb_extinction(knot), high: rgb_extinction(knot) }
+    Stretch { start, reciprocal: 0.0, low: rgb_extinction(knot), rise: [0.0; 4] }
 }
 
 fn linear(low: &Knot, high: &Knot, values: ValueScale) -> Stretch {
@@ -145,7 +210,8 @@ fn linear(low: &Knot, high: &Knot, values: ValueScale) -> Stretch {
     let start = values.number(low.value) as f32;
     let reciprocal = if length > 0.0 { (values.unit() / length) as f32 } else { 0.0 };
     let reciprocal = if reciprocal.is_finite() { reciprocal } else { 0.0 };
-    Stretch { start, reciprocal, low: rgb_extinction(low), high: rgb_extinction(high) }
+    let (low, high) = (rgb_extinction(low), rgb_extinction(high));
+    Stretch { start, reciprocal, low, rise: std::array::from_fn(|c| high[c] - low[c]) }
 }
 
 fn rgb_extinction(k: &Knot) -> [f32; 4] {

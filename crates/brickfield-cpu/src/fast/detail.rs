@@ -1,13 +1,12 @@
 //! What is visible inside bricks: rays leap over dark macrocells.
 
-use std::ops::Range;
-
 use brickfield_frame::MACROCELL_SIDE;
 
-use super::brick::{LANES, Nodes, at_most};
+use super::brick::{Nodes, Places, at_most};
+use super::eight::{Eight, LANES};
 
-/// Distances from which on a leap reaches beyond a batch of short steps.
-const FAR: i8 = 5;
+/// Distances from which on a leap reaches beyond eight short steps.
+const FAR: i8 = 4;
 
 /// Tells which segments of a ray inside one brick see nothing.
 pub(super) struct Sieve<'a, const N: usize> {
@@ -19,6 +18,9 @@ pub(super) struct Sieve<'a, const N: usize> {
     distances: &'a [i8],
 }
 
+/// A macrocell for each of eight nodes, along each axis.
+type Macrocells = [[u32; LANES]; 3];
+
 impl<'a, const N: usize> Sieve<'a, N> {
     const N_MACROCELLS: usize = N / MACROCELL_SIDE as usize;
 
@@ -27,77 +29,35 @@ impl<'a, const N: usize> Sieve<'a, N> {
         Sieve { nodes, far, distances: &distances[..Self::N_MACROCELLS.pow(3)] }
     }
 
-    /// Writes those of the first segments of some, at most a batch, that may see something, with room for eight more behind them; how many they
-    /// are, and the first one behind that may.
+    /// Which of eight segments from `first` on may see something, as bits, by the places of their nodes; and the first one behind them that may.
     #[inline(always)]
-    pub(super) fn find(&self, segments: Range<i32>, to: &mut [f32]) -> (usize, i32) {
-        let (first, n) = (segments.start, segments.end - segments.start);
-        let (mut bits, next) = match n <= LANES as i32 / 2 {
-            true => self.batch::<{ LANES / 2 }>(first),
-            false => self.batch::<LANES>(first),
+    pub(super) fn find<V: Eight>(&self, first: i32, near: &Places<V>, far: Option<&Places<V>>) -> (u8, i32) {
+        let (macrocells, distances) = self.look_up(near);
+        let visible = match far {
+            None => signs(distances),
+            Some(far) => pairs(&macrocells, &self.look_up(far).0, &distances),
         };
-        if n < LANES as i32 {
-            bits &= (1 << n) - 1;
-        }
-        let mut n_found = 0;
-        for eight in 0..LANES / 8 {
-            let own = (bits >> (8 * eight)) as u8;
-            for (to, bit) in to[n_found..n_found + 8].iter_mut().zip(SET_BITS[usize::from(own)]) {
-                *to = (first + 8 * eight as i32 + i32::from(bit)) as f32;
-            }
-            n_found += own.count_ones() as usize;
-        }
-        (n_found, next)
-    }
-
-    /// Which segments of the batch from `first` on may see something, as bits; and the first one behind it that may.
-    #[inline(always)]
-    fn batch<const L: usize>(&self, first: i32) -> (u32, i32) {
-        let mut at = [0f32; L];
-        for (l, at) in at.iter_mut().enumerate() {
-            *at = (first + l as i32) as f32;
-        }
-        let near = self.macrocells(&at);
-        let distances = self.distances(&near);
-        let visible = match self.far {
-            0.0 => bits::<L>(|l| distances[l] < 0),
-            far => {
-                at.iter_mut().for_each(|at| *at += far);
-                pairs(&near, &self.macrocells(&at), &distances)
-            }
-        };
-        let (behind, distance) = (first + L as i32, distances[L - 1]);
-        if visible != 0 || distance < FAR {
+        let (last, behind) = (LANES - 1, first + LANES as i32);
+        if visible != 0 || distances[last] < FAR {
             return (visible, behind);
         }
-        let last = near.map(|macrocells| macrocells[L - 1]);
-        (0, self.leaves(last, distance).max(behind))
+        let leaves = self.leaves(macrocells.map(|macrocells| macrocells[last]), distances[last]);
+        (0, leaves.max(behind))
     }
 
-    /// The distances of macrocells.
+    /// The macrocells that hold nodes, and their distances.
     #[inline(always)]
-    fn distances<const L: usize>(&self, [x, y, z]: &[[u32; L]; 3]) -> [i8; L] {
-        let n = Self::N_MACROCELLS as u32;
-        let mut distances = [0; L];
-        for l in 0..L {
-            let i = (x[l] + n * (y[l] + n * z[l])) as usize;
-            // Holds anyway; so the compiler knows it too.
-            distances[l] = self.distances[i & (Self::N_MACROCELLS.pow(3) - 1)];
+    fn look_up<V: Eight>(&self, places: &Places<V>) -> (Macrocells, [i8; LANES]) {
+        let [x, y, z] = places.cells;
+        let (side, n) = (MACROCELL_SIDE.ilog2(), Self::N_MACROCELLS.ilog2());
+        let (x, y, z) = (x.shr(side), y.shr(side), z.shr(side));
+        let places = (x + y.shl(n) + z.shl(2 * n)).to_array();
+        let mut distances = [0; LANES];
+        for (distance, place) in distances.iter_mut().zip(places) {
+            // The bound holds anyway; so the compiler knows it too.
+            *distance = self.distances[place as usize & (Self::N_MACROCELLS.pow(3) - 1)];
         }
-        distances
-    }
-
-    /// The macrocells that hold nodes, along each axis.
-    #[inline(always)]
-    fn macrocells<const L: usize>(&self, at: &[f32; L]) -> [[u32; L]; 3] {
-        let mut macrocells = [[0; L]; 3];
-        for (axis, macrocells) in macrocells.iter_mut().enumerate() {
-            let (cells, _) = self.nodes.cells::<N, L>(axis, at);
-            for l in 0..L {
-                macrocells[l] = cells[l] / MACROCELL_SIDE;
-            }
-        }
-        macrocells
+        ([x.to_array(), y.to_array(), z.to_array()], distances)
     }
 
     /// The first segment that is not wholly among the dark macrocells around one; the brick's own faces end it anyway.
@@ -120,24 +80,23 @@ impl<'a, const N: usize> Sieve<'a, N> {
 /// Which segments with two nodes may see something: those whose far node is not among the dark macrocells around the near
 /// one. Those are connected, so that the transfer function is 0 between two of their values, too.
 #[inline(always)]
-fn pairs<const L: usize>(near: &[[u32; L]; 3], far: &[[u32; L]; 3], distances: &[i8; L]) -> u32 {
-    let mut apart = [0; L];
-    for (near, far) in near.iter().zip(far) {
-        for l in 0..L {
-            apart[l] = near[l].abs_diff(far[l]).max(apart[l]);
-        }
-    }
-    bits::<L>(|l| i32::from(distances[l]) <= apart[l] as i32)
+fn pairs(near: &Macrocells, far: &Macrocells, distances: &[i8; LANES]) -> u8 {
+    let apart = |l: usize| (0..3).map(|axis| near[axis][l].abs_diff(far[axis][l])).max().unwrap_or(0);
+    bits(|l| i32::from(distances[l]) <= apart(l) as i32)
+}
+
+/// A bit for each number, set for negative ones.
+#[inline(always)]
+fn signs(numbers: [i8; LANES]) -> u8 {
+    let signs = u64::from_le_bytes(pulp::cast(numbers)) & 0x8080_8080_8080_8080;
+    // Brings bit 7 of byte l to bit 56 + l.
+    (signs.wrapping_mul(0x0002_0408_1020_4081) >> 56) as u8
 }
 
 /// One bit for each lane.
 #[inline(always)]
-fn bits<const L: usize>(is_set: impl Fn(usize) -> bool) -> u32 {
-    let mut bits = 0;
-    for l in 0..L {
-        bits |= u32::from(is_set(l)) << l;
-    }
-    bits
+fn bits(is_set: impl Fn(usize) -> bool) -> u8 {
+    (0..LANES).fold(0, |bits, l| bits | u8::from(is_set(l)) << l)
 }
 
 /// The least integer not below; at most 2^31 - 128.
@@ -146,21 +105,3 @@ fn ceil(x: f32) -> i32 {
     let down = at_most(x, 2_147_483_520.0) as i32;
     down + i32::from((down as f32) < x)
 }
-
-/// For each byte the places of its set bits, from the lowest on.
-const SET_BITS: [[u8; 8]; 256] = {
-    let mut all = [[0; 8]; 256];
-    let mut byte = 0;
-    while byte < 256 {
-        let (mut n, mut bit) = (0, 0);
-        while bit < 8 {
-            if byte >> bit & 1 == 1 {
-                all[byte][n] = bit as u8;
-                n += 1;
-            }
-            bit += 1;
-        }
-        byte += 1;
-    }
-    all
-};

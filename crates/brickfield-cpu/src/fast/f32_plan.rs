@@ -3,8 +3,10 @@
 use brickfield_core::glam::{DVec3, UVec3};
 use brickfield_frame::{FramePlan, IndexEntry, SampleFormat};
 
-use super::brick::{Nodes, Stored};
+use super::brick::{Places, Stored, stored_at};
 use super::classify::Classifier;
+use super::eight::{Eight, F32s};
+use super::walk::faces;
 
 /// A plan whose bricks have N samples a side, stored as `S`.
 pub(super) struct F32Plan<'a, const N: usize, S> {
@@ -14,8 +16,10 @@ pub(super) struct F32Plan<'a, const N: usize, S> {
     pub(super) center: DVec3,
     pub(super) last: DVec3,
     pub(super) numbers: Numbers,
-    /// The instructions that the processor has.
-    pub(super) simd: pulp::Arch,
+    /// The index: cells along each axis, the packed entries, and where cells meet.
+    pub(super) n_cells: [usize; 3],
+    pub(super) words: &'a [u32],
+    pub(super) faces: [Vec<f64>; 3],
     stored: std::marker::PhantomData<S>,
 }
 
@@ -42,84 +46,77 @@ impl Numbers {
     }
 }
 
-/// The block of index cells that holds a position, and how far it reaches, in sample space.
+/// A block of index cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Block {
     pub(super) entry: IndexEntry,
-    /// Lower corner of the brick.
+    /// Lower corner of the brick, in sample space.
     pub(super) corner: DVec3,
-    /// The positions that belong to the block; infinite at the volume's surface.
-    pub(super) low: DVec3,
-    pub(super) high: DVec3,
 }
 
 impl<'a, const N: usize, S: Stored> F32Plan<'a, N, S> {
     pub(super) fn new(plan: &'a FramePlan) -> Self {
+        let dims = plan.field().index().dims();
         F32Plan {
             plan,
             center: plan.rays().center,
             last: plan.field().last_sample(),
             numbers: Numbers::of(plan),
+            n_cells: dims.to_array().map(|n| n as usize),
+            words: plan.field().index().words(),
+            faces: dims.to_array().map(|n| faces(n, (N - 1) as f64)),
             transfer: Classifier::new(plan.transfer(), plan.value_scale()),
-            simd: pulp::Arch::new(),
             stored: std::marker::PhantomData,
         }
     }
 
     /// The block that holds sample position `q`.
     #[inline(always)]
-    pub(super) fn block(&self, q: DVec3) -> Block {
+    fn block(&self, q: DVec3) -> Block {
+        self.block_of(self.cell_at(q))
+    }
+
+    /// The index cell that holds sample position `q`.
+    #[inline(always)]
+    pub(super) fn cell_at(&self, q: DVec3) -> UVec3 {
         const { assert!(N.is_power_of_two()) }
         let n_cells = (N - 1) as f64;
         let dims = self.plan.field().index().dims();
         // Truncation is floor: a clamped position is not negative. Half a sample away from every face, the quotient's
         // rounding does not matter.
         let sample = q.clamp(DVec3::ZERO, self.last).as_ivec3().as_dvec3();
-        self.block_of(((sample + 0.5) * (1.0 / n_cells)).as_ivec3().as_uvec3().min(dims - 1))
+        ((sample + 0.5) * (1.0 / n_cells)).as_ivec3().as_uvec3().min(dims - 1)
     }
 
     /// The block of an index cell.
     #[inline(always)]
     pub(super) fn block_of(&self, cell: UVec3) -> Block {
-        let (n_cells, dims) = ((N - 1) as f64, self.plan.field().index().dims());
         let entry = self.plan.field().index().at(cell);
-        let (low, high) = entry.reach().block(cell);
-        let corner = low.as_dvec3() * n_cells;
-        Block {
-            entry,
-            corner,
-            low: DVec3::select(low.cmpeq(UVec3::ZERO), DVec3::NEG_INFINITY, corner),
-            high: DVec3::select(high.cmpge(dims), DVec3::INFINITY, high.as_dvec3() * n_cells),
-        }
+        let (low, _) = entry.reach().block(cell);
+        Block { entry, corner: low.as_dvec3() * (N - 1) as f64 }
     }
 
     /// The value at a sample position, as a number of the value scale; `None` where its block is empty.
+    #[inline(always)]
     pub(super) fn value(&self, q: DVec3) -> Option<f32> {
         self.value_in(&self.block(q), q)
     }
 
     /// The value that a block has at a sample position.
+    #[inline(always)]
     pub(super) fn value_in(&self, block: &Block, q: DVec3) -> Option<f32> {
         let IndexEntry::Resident { slot, reach } = block.entry else { return None };
-        let stride = f64::from(reach.level_of_brick().stride());
-        let s = (q.clamp(DVec3::ZERO, self.last) - block.corner) / stride;
-        let nodes = Nodes {
-            origin: s.as_vec3().to_array(),
-            change: [0.0; 3],
-            last: [(N - 1) as f32; 3],
-            bias: self.numbers.bias,
-        };
-        Some(self.values(&nodes, self.brick(slot), &[0.0])[0])
+        let scale = 1.0 / f64::from(reach.level_of_brick().stride());
+        let s = (q.clamp(DVec3::ZERO, self.last) - block.corner) * scale;
+        let stored = stored_at::<N, S>(self.brick(slot), s.as_vec3().to_array(), self.numbers.bias);
+        Some(stored * self.numbers.gain + self.numbers.offset)
     }
 
-    /// The values at nodes `at`, as numbers of the value scale.
+    /// The values at places in a brick, as numbers of the value scale.
     #[inline(always)]
-    pub(super) fn values<const L: usize>(&self, nodes: &Nodes, brick: &[u8], at: &[f32; L]) -> [f32; L] {
-        let mut values = nodes.stored::<N, S, L>(brick, at);
-        for value in &mut values {
-            *value = *value * self.numbers.gain + self.numbers.offset;
-        }
-        values
+    pub(super) fn values<V: Eight>(&self, eight: V, brick: &[u8], places: &Places<V>) -> F32s<V> {
+        let stored = places.stored::<N, S>(eight, brick, self.numbers.bias);
+        stored.times_plus(F32s::all(eight, self.numbers.gain), F32s::all(eight, self.numbers.offset))
     }
 
     /// The bytes of the brick in a slot.

@@ -6,25 +6,26 @@ use brickfield_core::glam::DVec3;
 use brickfield_core::{Level, Span};
 use brickfield_frame::{Division, FramePlan, IndexEntry, Lengths, PlanRay, Sampling};
 
-use super::brick::{LANES, Lanes, Nodes, Stored};
+use super::brick::{Nodes, Stored};
 use super::classify::Classifier;
 use super::detail::Sieve;
+use super::eight::{Eight, F32s, LANES};
 use super::f32_plan::{Block, F32Plan};
 use super::segment::{Ray32, Segment32, segment};
 use super::waiting::Waiting;
+use super::walk::Walk;
 use crate::blocks::Blocks;
 
 /// The segments of a ray's span: first..end, the first and the last of them cut to the span.
 pub(super) struct Path<'a> {
     pub(super) ray: &'a PlanRay,
     span: Span,
-    step: f64,
+    pub(super) step: f64,
     /// The length that the light of a whole segment is computed for.
     length: f32,
     lengths: Lengths,
-    /// Segments per world unit, and world units per voxel along each axis.
-    per_unit: f64,
-    reciprocal: DVec3,
+    /// Segments per world unit.
+    pub(super) per_unit: f64,
     pub(super) first: i64,
     pub(super) end: i64,
 }
@@ -46,13 +47,13 @@ impl<'a> Path<'a> {
             length: length as f32,
             lengths: sampling.lengths(),
             per_unit: 1.0 / step,
-            reciprocal: ray.direction.recip(),
             first: floor(span.start / step),
             end: floor(span.end / step) + 1,
         }
     }
 
     /// Near end of segment `k`, how far its far end is, and the length that its light is computed for.
+    #[inline(always)]
     pub(super) fn segment(&self, k: i64) -> (f64, f64, f32) {
         let uncut = k as f64 * self.step;
         match self.lengths {
@@ -93,6 +94,7 @@ const MOST: i64 = 1 << 23;
 #[inline(always)]
 pub(super) fn march<const N: usize, S: Stored>(
     plan32: &F32Plan<N, S>,
+    eight: impl Eight,
     ray: &PlanRay,
     runs: &[Range<i64>],
     state: &mut Ray32,
@@ -101,8 +103,8 @@ pub(super) fn march<const N: usize, S: Stored>(
     let domain = (plan.domain().min - plan32.center, plan.domain().max - plan32.center);
     let Some(span) = clip(ray, domain, ray.t_eye) else { return };
     match plan.sampling().division() {
-        Division::Ray => along(plan32, &Path::new(plan.sampling(), ray, span, Level(0)), runs, state),
-        Division::Brick => brick_by_brick(plan32, ray, span, state),
+        Division::Ray => along(plan32, eight, &Path::new(plan.sampling(), ray, span, Level(0)), runs, state),
+        Division::Brick => brick_by_brick(plan32, eight, ray, span, state),
     }
 }
 
@@ -112,30 +114,82 @@ fn floor(x: f64) -> i64 {
 
 /// The segments of some runs, block by block.
 #[inline(always)]
-fn along<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, path: &Path, runs: &[Range<i64>], state: &mut Ray32) {
+fn along<const N: usize, S: Stored>(
+    plan32: &F32Plan<N, S>,
+    eight: impl Eight,
+    path: &Path,
+    runs: &[Range<i64>],
+    state: &mut Ray32,
+) {
     let nodes = plan32.plan.sampling().rule().nodes();
     let (near, far) = (nodes[0], nodes[nodes.len() - 1]);
     let floor = plan32.plan.sampling().transmittance_floor();
-    let mut waiting = Waiting::new(state, path.length);
+    let mut waiting = Waiting::new(eight, state, path.length);
     for segments in runs {
         let (mut k, to) = (path.first.max(segments.start), path.end.min(segments.end));
-        while k < to {
-            let n = if path.is_whole(k) { run(plan32, path, k, (near, far), to, &mut waiting) } else { 0 };
-            if n == 0 {
-                waiting.push(plan32, single(plan32, path, k));
-            }
-            k += n.max(1);
-            if waiting.ray.has_ended(floor) {
-                return;
-            }
+        if k < to && k == path.first {
+            waiting.push(plan32, single(plan32, path, k));
+            k += 1;
+        }
+        k = along_blocks(plan32, path, k..to.min(path.end - 1), (near, far), &mut waiting);
+        if k < to && !waiting.ray.has_ended(floor) {
+            waiting.push(plan32, single(plan32, path, k));
+        }
+        if waiting.ray.has_ended(floor) {
+            return;
         }
     }
     waiting.push_all(plan32);
 }
 
+/// Whole segments, block by block, until the ray has ended; the first that is left.
+#[inline(always)]
+fn along_blocks<const N: usize, S: Stored>(
+    plan32: &F32Plan<N, S>,
+    path: &Path,
+    segments: Range<i64>,
+    (near, far): (f64, f64),
+    waiting: &mut Waiting<impl Eight>,
+) -> i64 {
+    let (mut k, to) = (segments.start, segments.end);
+    if k >= to {
+        return k;
+    }
+    let floor = plan32.plan.sampling().transmittance_floor();
+    let mut walk = Walk::new(plan32, path, k as f64 + near);
+    loop {
+        let n = ((walk.exit - far).ceil() - k as f64).min((to - k).min(MOST) as f64) as i32;
+        if n > 0 {
+            if let Some((slot, reach, corner)) = walk.resident() {
+                let level = reach.level_of_brick();
+                Resident { slot, level, corner }.run(plan32, path, k, (near, far), n, waiting);
+            }
+            k += i64::from(n);
+            if k < to && k as f64 + far < walk.exit {
+                continue;
+            }
+        }
+        // Segments that begin in this block and end in the next.
+        while k < to && k as f64 + near < walk.exit {
+            waiting.push(plan32, single(plan32, path, k));
+            k += 1;
+        }
+        if k >= to || waiting.ray.has_ended(floor) {
+            return k;
+        }
+        walk.leave(k as f64 + near);
+    }
+}
+
 /// The segments of each brick.
 #[inline(always)]
-fn brick_by_brick<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, ray: &PlanRay, span: Span, state: &mut Ray32) {
+fn brick_by_brick<const N: usize, S: Stored>(
+    plan32: &F32Plan<N, S>,
+    eight: impl Eight,
+    ray: &PlanRay,
+    span: Span,
+    state: &mut Ray32,
+) {
     let nodes = plan32.plan.sampling().rule().nodes();
     let nodes = (nodes[0], nodes[nodes.len() - 1]);
     let floor = plan32.plan.sampling().transmittance_floor();
@@ -144,8 +198,8 @@ fn brick_by_brick<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, ray: &PlanR
         let level = reach.level_of_brick();
         let path = Path::new(plan32.plan.sampling(), ray, crossing.span, level);
         let block = plan32.block_of(crossing.cell);
-        let resident = Resident { block: &block, slot, level };
-        let (mut k, mut waiting) = (path.first + 1, Waiting::new(state, path.length));
+        let resident = Resident { slot, level, corner: block.corner };
+        let (mut k, mut waiting) = (path.first + 1, Waiting::new(eight, state, path.length));
         waiting.push(plan32, single_in(plan32, &path, &block, path.first));
         while k < path.end - 1 {
             let n = (path.end - 1 - k).min(MOST);
@@ -173,6 +227,7 @@ fn single<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, path: &Path, k: i64
 }
 
 /// One segment, by the values at its nodes' sample positions.
+#[inline(always)]
 pub(super) fn one(
     (plan, transfer): (&FramePlan, &Classifier),
     path: &Path,
@@ -184,6 +239,7 @@ pub(super) fn one(
 }
 
 /// What a segment has at its nodes' sample positions, and the length that its light is computed for.
+#[inline(always)]
 pub(super) fn nodes_of<T>(
     plan: &FramePlan,
     path: &Path,
@@ -196,35 +252,15 @@ pub(super) fn nodes_of<T>(
     ([at(&nodes[0]), nodes.get(1).and_then(at)], weight)
 }
 
-/// All whole segments from `k` on whose nodes lie in the block of segment `k`'s first node; returns how many they are.
-#[inline(always)]
-fn run<const N: usize, S: Stored>(
-    plan32: &F32Plan<N, S>,
-    path: &Path,
-    k: i64,
-    (near, far): (f64, f64),
-    to: i64,
-    waiting: &mut Waiting,
-) -> i64 {
-    let t = (k as f64 + near) * path.step;
-    let block = plan32.block(plan32.center + path.ray.at(t));
-    let exit = exit(path, plan32.center, (block.low, block.high));
-    let n = ((exit * path.per_unit - far).ceil() - k as f64).min((to.min(path.end - 1) - k).min(MOST) as f64) as i32;
-    if let (IndexEntry::Resident { slot, reach }, true) = (block.entry, n > 0) {
-        Resident { block: &block, slot, level: reach.level_of_brick() }.run(plan32, path, k, (near, far), n, waiting);
-    }
-    // Rounding may have put the node into a block that the ray has left already.
-    i64::from(n.max(0))
-}
-
-/// A block that is a brick.
-struct Resident<'a> {
-    block: &'a Block,
+/// A brick in a slot.
+struct Resident {
     slot: u32,
     level: Level,
+    /// Where it begins in sample space.
+    corner: DVec3,
 }
 
-impl Resident<'_> {
+impl Resident {
     /// Whole segments `k..k + n`, all of whose nodes lie in the brick.
     #[inline(always)]
     fn run<const N: usize, S: Stored>(
@@ -234,17 +270,15 @@ impl Resident<'_> {
         k: i64,
         (near, far): (f64, f64),
         n: i32,
-        waiting: &mut Waiting,
+        waiting: &mut Waiting<impl Eight>,
     ) {
         let t = (k as f64 + near) * path.step;
         let scale = 1.0 / f64::from(self.level.stride());
         let array = |v: DVec3| v.as_vec3().to_array();
-        let corner = self.block.corner;
         let nodes = Nodes {
-            origin: array((plan32.center + path.ray.at(t) - corner) * scale),
+            origin: array((plan32.center + path.ray.at(t) - self.corner) * scale),
             change: array(path.ray.direction * (path.step * scale)),
-            last: array(((plan32.last - corner) * scale).min(DVec3::splat((N - 1) as f64))),
-            bias: plan32.numbers.bias,
+            last: array(((plan32.last - self.corner) * scale).min(DVec3::splat((N - 1) as f64))),
         };
         let far = (far - near) as f32;
         let brick = plan32.brick(self.slot);
@@ -252,26 +286,11 @@ impl Resident<'_> {
         match plan32.plan.occupancy().filter(|occupancy| !occupancy.is_visible_throughout(self.slot)) {
             Some(occupancy) => {
                 let sieve = Sieve::<N>::new(nodes, far, occupancy.brick(self.slot));
-                inner.push_visible(plan32, &sieve, n, waiting);
+                inner.push(plan32, Some(&sieve), n, waiting);
             }
-            None => inner.push_all(plan32, n, waiting),
+            None => inner.push(plan32, None, n, waiting),
         }
     }
-}
-
-/// Where the ray leaves a box in sample space.
-#[inline(always)]
-pub(super) fn exit(path: &Path, center: DVec3, (low, high): (DVec3, DVec3)) -> f64 {
-    let origin = path.ray.anchor + center;
-    let mut exit = f64::INFINITY;
-    for axis in 0..3 {
-        let d = path.ray.direction[axis];
-        let face = if d > 0.0 { high[axis] } else { low[axis] };
-        if d != 0.0 {
-            exit = exit.min((face - origin[axis]) * path.reciprocal[axis]);
-        }
-    }
-    exit + path.ray.t_anchor
 }
 
 /// The segments of a ray inside one brick.
@@ -284,72 +303,46 @@ struct Inner<'a> {
 }
 
 impl Inner<'_> {
-    /// Segments `0..n`, one after the other.
+    /// Those of segments `0..n` that may see something.
     #[inline(always)]
-    fn push_all<const N: usize, S: Stored>(&self, plan32: &F32Plan<N, S>, n: i32, waiting: &mut Waiting) {
-        for first in (0..n).step_by(LANES) {
-            let at = std::array::from_fn(|l| (first + l as i32) as f32);
-            self.look(plan32, &at, ((n - first) as usize).min(LANES), waiting);
-            if waiting.ray.transmittance < plan32.plan.sampling().transmittance_floor() {
+    fn push<const N: usize, S: Stored, V: Eight>(
+        &self,
+        plan32: &F32Plan<N, S>,
+        sieve: Option<&Sieve<N>>,
+        n: i32,
+        waiting: &mut Waiting<V>,
+    ) {
+        let (eight, sampling) = (waiting.eight, plan32.plan.sampling());
+        let floor = sampling.transmittance_floor();
+        let mut first = 0;
+        while first < n {
+            let at = F32s::count(eight) + F32s::all(eight, first as f32);
+            let near = self.nodes.places::<N, V>(eight, at);
+            let far = match sampling.rule().nodes().len() {
+                1 => None,
+                _ => Some(self.nodes.places::<N, V>(eight, at + F32s::all(eight, self.far))),
+            };
+            let mut n_here = (n - first).min(LANES as i32) as usize;
+            let mut next = first + LANES as i32;
+            if let Some(sieve) = sieve {
+                let (visible, behind) = sieve.find(first, &near, far.as_ref());
+                // Up to the last one that may.
+                n_here = n_here.min(u8::BITS as usize - visible.leading_zeros() as usize);
+                next = behind;
+            }
+            first = next;
+            if n_here == 0 {
+                continue;
+            }
+            let far = match far {
+                None => None,
+                Some(far) => Some(plan32.values(eight, self.brick, &far)),
+            };
+            waiting.add(plan32, plan32.values(eight, self.brick, &near), far, n_here);
+            if waiting.ray.transmittance < floor {
                 return;
             }
         }
-    }
-
-    /// Those of segments `0..n` that may see something.
-    #[inline(always)]
-    fn push_visible<const N: usize, S: Stored>(
-        &self,
-        plan32: &F32Plan<N, S>,
-        sieve: &Sieve<N>,
-        n: i32,
-        waiting: &mut Waiting,
-    ) {
-        // Room for less than a batch, and those of another one.
-        let (mut visible, mut n_visible) = ([0f32; 3 * LANES], 0);
-        let mut first = 0;
-        while first < n {
-            let (n_found, next) = sieve.find(first..n, &mut visible[n_visible..]);
-            n_visible += n_found;
-            if n_visible >= LANES {
-                self.look(plan32, &std::array::from_fn(|l| visible[l]), LANES, waiting);
-                if waiting.ray.transmittance < plan32.plan.sampling().transmittance_floor() {
-                    return;
-                }
-                n_visible -= LANES;
-                visible.copy_within(LANES..2 * LANES, 0);
-            }
-            first = next;
-        }
-        if n_visible > 0 {
-            self.look(plan32, &std::array::from_fn(|l| visible[l]), n_visible, waiting);
-        }
-    }
-
-    /// Lets the first `n` of some segments wait behind those before them. Few take half a batch.
-    #[inline(always)]
-    fn look<const N: usize, S: Stored>(&self, plan32: &F32Plan<N, S>, at: &Lanes, n: usize, waiting: &mut Waiting) {
-        match n <= LANES / 2 {
-            true => self.look_at::<N, S, { LANES / 2 }>(plan32, std::array::from_fn(|l| at[l]), n, waiting),
-            false => self.look_at::<N, S, LANES>(plan32, *at, n, waiting),
-        }
-        waiting.push_batch(plan32);
-    }
-
-    #[inline(always)]
-    fn look_at<const N: usize, S: Stored, const L: usize>(
-        &self,
-        plan32: &F32Plan<N, S>,
-        mut at: [f32; L],
-        n: usize,
-        waiting: &mut Waiting,
-    ) {
-        let near = plan32.values(&self.nodes, self.brick, &at);
-        let far = (plan32.plan.sampling().rule().nodes().len() > 1).then(|| {
-            at.iter_mut().for_each(|at| *at += self.far);
-            plan32.values(&self.nodes, self.brick, &at)
-        });
-        waiting.add(&near, far.as_ref(), n);
     }
 }
 

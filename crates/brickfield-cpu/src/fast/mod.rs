@@ -4,6 +4,7 @@ mod batch;
 mod brick;
 pub(crate) mod classify;
 mod detail;
+mod eight;
 mod f32_plan;
 mod light;
 mod march;
@@ -13,6 +14,7 @@ mod scalar;
 pub(crate) mod segment;
 mod single;
 mod waiting;
+mod walk;
 
 use std::ops::Range;
 use std::time::Instant;
@@ -29,6 +31,7 @@ use rayon::prelude::*;
 use crate::mesh::mesh_pixels;
 use brick::{Float32, Stored, Unorm8, Unorm16};
 use classify::{Classifier, Optics32};
+use eight::{Eight, Vectorized, vectorized};
 use f32_plan::F32Plan;
 use light::Lamp;
 use placed::PlacedPlan;
@@ -161,7 +164,7 @@ trait Renderer: Sync {
     }
 
     /// A ray, of which some runs of segments may see something, front to back, behind what it has seen.
-    fn march(&self, ray: &PlanRay, runs: &[Range<i64>], state: &mut Ray32);
+    fn march(&self, eight: impl Eight, ray: &PlanRay, runs: &[Range<i64>], state: &mut Ray32);
 }
 
 impl<const N: usize, S: Stored> Renderer for F32Plan<'_, N, S> {
@@ -178,9 +181,9 @@ impl<const N: usize, S: Stored> Renderer for F32Plan<'_, N, S> {
     }
 
     #[inline(always)]
-    fn march(&self, ray: &PlanRay, runs: &[Range<i64>], state: &mut Ray32) {
+    fn march(&self, eight: impl Eight, ray: &PlanRay, runs: &[Range<i64>], state: &mut Ray32) {
         match self.plan.lighting() {
-            None => march::march(self, ray, runs, state),
+            None => march::march(self, eight, ray, runs, state),
             Some(_) => single::march_singly(self, ray, runs, state),
         }
     }
@@ -219,9 +222,8 @@ impl Work for Rendering<'_> {
     type Output = f32;
     fn run(self, renderer: &impl Renderer) -> f32 {
         let width = renderer.plan().size().x.max(1) as usize;
-        let simd = pulp::Arch::new();
         let bands = self.rays.par_chunks_mut(width * TILE).enumerate();
-        bands.for_each(|(band, rays)| simd.dispatch(Band { renderer, first_row: band * TILE, width, rays }));
+        bands.for_each(|(band, rays)| vectorized(Band { renderer, first_row: band * TILE, width, rays }));
         Lamp::of(renderer).map_or(1.0, |lamp| lamp.brightest())
     }
 }
@@ -239,10 +241,9 @@ struct Band<'a, R> {
     rays: &'a mut [Ray32],
 }
 
-impl<R: Renderer> pulp::NullaryFnOnce for Band<'_, R> {
-    type Output = ();
+impl<R: Renderer> Vectorized for Band<'_, R> {
     #[inline(always)]
-    fn call(self) {
+    fn run(self, eight: impl Eight) {
         let n_rows = self.rays.len() / self.width;
         let plan = self.renderer.plan();
         for tile in (0..self.width).step_by(TILE) {
@@ -256,11 +257,11 @@ impl<R: Renderer> pulp::NullaryFnOnce for Band<'_, R> {
                 let ray = plan.rays().ray(x as u32, (self.first_row + y) as u32);
                 let state = &mut self.rays[y * self.width + x];
                 match plan.proxy() {
-                    None => self.renderer.march(&ray, runs, state),
+                    None => self.renderer.march(eight, &ray, runs, state),
                     // Batches of polygons come from back to front.
                     Some(_) => {
                         let mut front = Ray32::default();
-                        self.renderer.march(&ray, runs, &mut front);
+                        self.renderer.march(eight, &ray, runs, &mut front);
                         *state = front.before(state);
                     }
                 }

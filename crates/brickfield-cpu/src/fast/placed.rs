@@ -11,6 +11,7 @@ use brickfield_interp::interpolate;
 
 use super::brick::{Stored, Unorm8};
 use super::classify::{Classifier, Optics32};
+use super::eight::Eight;
 use super::f32_plan::Numbers;
 use super::prefiltered::{Values32, expected};
 use super::segment::Ray32;
@@ -154,7 +155,7 @@ impl<S: Stored> Renderer for PlacedPlan<'_, S> {
         })
     }
 
-    fn march(&self, ray: &PlanRay, runs: &[Range<i64>], state: &mut Ray32) {
+    fn march(&self, _: impl Eight, ray: &PlanRay, runs: &[Range<i64>], state: &mut Ray32) {
         single::march_singly(self, ray, runs, state);
     }
 }

@@ -76,7 +76,21 @@ fn alike(plan: &FramePlan, path: &Path, k: i64) -> (i64, bool) {
     let (near, far) = (nodes[0], nodes[nodes.len() - 1]);
     let center = plan.rays().center;
     let (region, is_dark) = region_at(plan, center + path.position(k, near));
-    (path.n_before(k, far, march::exit(path, center, (region.min, region.max))), is_dark)
+    (path.n_before(k, far, exit(path.ray, center, region)), is_dark)
+}
+
+/// Where a ray leaves a box in sample space.
+fn exit(ray: &PlanRay, center: DVec3, region: Aabb) -> f64 {
+    let origin = ray.anchor + center;
+    let mut exit = f64::INFINITY;
+    for axis in 0..3 {
+        let d = ray.direction[axis];
+        if d != 0.0 {
+            let face = if d > 0.0 { region.max[axis] } else { region.min[axis] };
+            exit = exit.min((face - origin[axis]) / d);
+        }
+    }
+    exit + ray.t_anchor
 }
 
 /// A region around a sample position: all of it dark, or none of it known to be.
