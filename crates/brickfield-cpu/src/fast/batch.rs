@@ -7,7 +7,7 @@ use super::eight::{Eight, F32s, LANES, Mask, Vectorized, With};
 use super::scalar::{exp_minus_of, opacities};
 use super::segment::Ray32;
 
-/// Some segments, and the values at their nodes: as many eights as hold them (in the lanes behind, the last segment's).
+/// Some segments, and the values at their nodes: as many eights as hold them (in the lanes behind, any numbers).
 pub(super) struct Batch<'a> {
     pub(super) rule: QuadratureRule,
     pub(super) transfer: &'a Classifier,

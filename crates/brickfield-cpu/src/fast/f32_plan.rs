@@ -20,6 +20,8 @@ pub(super) struct F32Plan<'a, const N: usize, S> {
     pub(super) n_cells: [usize; 3],
     pub(super) words: &'a [u32],
     pub(super) faces: [Vec<f64>; 3],
+    /// The bytes of the bricks in all slots; none in those that the index does not name.
+    bricks: Vec<&'a [u8]>,
     stored: std::marker::PhantomData<S>,
 }
 
@@ -56,7 +58,7 @@ pub(super) struct Block {
 
 impl<'a, const N: usize, S: Stored> F32Plan<'a, N, S> {
     pub(super) fn new(plan: &'a FramePlan) -> Self {
-        let dims = plan.field().index().dims();
+        let (dims, slots) = (plan.field().index().dims(), plan.field().slots());
         F32Plan {
             plan,
             center: plan.rays().center,
@@ -65,6 +67,9 @@ impl<'a, const N: usize, S: Stored> F32Plan<'a, N, S> {
             n_cells: dims.to_array().map(|n| n as usize),
             words: plan.field().index().words(),
             faces: dims.to_array().map(|n| faces(n, (N - 1) as f64)),
+            bricks: (0..slots.n_slots())
+                .map(|slot| slots.samples(slot).map_or(&[][..], |samples| samples.bytes()))
+                .collect(),
             transfer: Classifier::new(plan.transfer(), plan.value_scale()),
             stored: std::marker::PhantomData,
         }
@@ -122,8 +127,6 @@ impl<'a, const N: usize, S: Stored> F32Plan<'a, N, S> {
     /// The bytes of the brick in a slot.
     #[inline(always)]
     pub(super) fn brick(&self, slot: u32) -> &'a [u8] {
-        let samples =
-            self.plan.field().slots().samples(slot).expect("the slots that a plan's index names hold samples");
-        &samples.bytes()[..N * N * N * S::N_BYTES]
+        &self.bricks[slot as usize][..N * N * N * S::N_BYTES]
     }
 }

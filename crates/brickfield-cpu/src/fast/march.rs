@@ -36,6 +36,7 @@ impl<'a> Path<'a> {
     pub(super) fn new(sampling: &Sampling, ray: &'a PlanRay, span: Span, level: Level) -> Path<'a> {
         let nominal = sampling.step_world() * f64::from(level.stride());
         let step = nominal * ray.stretch;
+        let per_unit = 1.0 / step;
         let length = match sampling.lengths() {
             Lengths::True => step,
             Lengths::Nominal => nominal,
@@ -46,9 +47,9 @@ impl<'a> Path<'a> {
             step,
             length: length as f32,
             lengths: sampling.lengths(),
-            per_unit: 1.0 / step,
-            first: floor(span.start / step),
-            end: floor(span.end / step) + 1,
+            per_unit,
+            first: floor(span.start * per_unit),
+            end: floor(span.end * per_unit) + 1,
         }
     }
 
@@ -222,6 +223,7 @@ fn single_in<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, path: &Path, blo
 }
 
 /// One segment, wherever its nodes lie.
+#[inline(always)]
 fn single<const N: usize, S: Stored>(plan32: &F32Plan<N, S>, path: &Path, k: i64) -> Segment32 {
     one((plan32.plan, &plan32.transfer), path, k, |q| plan32.value(q))
 }

@@ -68,10 +68,6 @@ impl<'a, V: Eight> Waiting<'a, V> {
         if n == 0 {
             return;
         }
-        for values in [&mut self.near, &mut self.far] {
-            let last = values[n - 1];
-            values[n..BATCH].fill(last);
-        }
         self.push_first(plan32, n);
     }
 
