@@ -17,6 +17,18 @@ pub(super) trait Eight: Simd<f32s = f32x8, u32s = u32x8, m32s = m32x8> {
     /// The numbers of a table at some places, of which the lowest three bits count.
     fn look_up(self, table: f32x8, at: u32x8) -> f32x8;
 
+    /// a b + c, rounded once where the processor can.
+    fn times_plus(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8;
+
+    /// The greater numbers; those of `b` where one is NaN.
+    fn greater(self, a: f32x8, b: f32x8) -> f32x8;
+
+    /// The lesser numbers; those of `b` where one is NaN.
+    fn lesser(self, a: f32x8, b: f32x8) -> f32x8;
+
+    /// The greatest number.
+    fn greatest(self, x: f32x8) -> f32;
+
     /// Integers below 2^31 as numbers.
     fn of_integers(self, integers: u32x8) -> f32x8;
 
@@ -32,6 +44,26 @@ impl Eight for pulp::x86::V3 {
     #[inline(always)]
     fn look_up(self, table: f32x8, at: u32x8) -> f32x8 {
         cast(self.avx2._mm256_permutevar8x32_ps(cast(table), cast(at)))
+    }
+
+    #[inline(always)]
+    fn times_plus(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8 {
+        self.mul_add_f32x8(a, b, c)
+    }
+
+    #[inline(always)]
+    fn greater(self, a: f32x8, b: f32x8) -> f32x8 {
+        self.max_f32s(a, b)
+    }
+
+    #[inline(always)]
+    fn lesser(self, a: f32x8, b: f32x8) -> f32x8 {
+        self.min_f32s(a, b)
+    }
+
+    #[inline(always)]
+    fn greatest(self, x: f32x8) -> f32 {
+        self.reduce_max_f32s(x)
     }
 
     #[inline(always)]
@@ -59,6 +91,49 @@ impl Eight for Scalar256b {
     fn look_up(self, table: f32x8, at: u32x8) -> f32x8 {
         let (table, at): ([f32; LANES], [u32; LANES]) = (cast(table), cast(at));
         cast(at.map(|at| table[at as usize % LANES]))
+    }
+
+    /// (Where it has no instruction, rounding once takes a call for each number.)
+    #[inline(always)]
+    fn times_plus(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8 {
+        let (a, b, c): ([f32; LANES], [f32; LANES], [f32; LANES]) = (cast(a), cast(b), cast(c));
+        let mut sums = c;
+        for l in 0..LANES {
+            sums[l] = match cfg!(target_arch = "aarch64") {
+                true => a[l].mul_add(b[l], c[l]),
+                false => a[l] * b[l] + c[l],
+            };
+        }
+        cast(sums)
+    }
+
+    #[inline(always)]
+    fn greater(self, a: f32x8, b: f32x8) -> f32x8 {
+        let (a, mut b): ([f32; LANES], [f32; LANES]) = (cast(a), cast(b));
+        for l in 0..LANES {
+            b[l] = if a[l] > b[l] { a[l] } else { b[l] };
+        }
+        cast(b)
+    }
+
+    #[inline(always)]
+    fn lesser(self, a: f32x8, b: f32x8) -> f32x8 {
+        let (a, mut b): ([f32; LANES], [f32; LANES]) = (cast(a), cast(b));
+        for l in 0..LANES {
+            b[l] = if a[l] < b[l] { a[l] } else { b[l] };
+        }
+        cast(b)
+    }
+
+    #[inline(always)]
+    fn greatest(self, x: f32x8) -> f32 {
+        let mut x: [f32; LANES] = cast(x);
+        for half in [4, 2, 1] {
+            for l in 0..half {
+                x[l] = if x[l + half] > x[l] { x[l + half] } else { x[l] };
+            }
+        }
+        x[0]
     }
 
     #[inline(always)]
@@ -148,24 +223,25 @@ impl<V: Eight> F32s<V> {
     /// self a + b, rounded once where the processor can.
     #[inline(always)]
     pub(super) fn times_plus(self, a: F32s<V>, b: F32s<V>) -> F32s<V> {
-        self.with(self.eight.mul_add_e_f32s(self.x, a.x, b.x))
+        self.with(self.eight.times_plus(self.x, a.x, b.x))
     }
 
     /// The greater numbers; those of `low` for NaN.
     #[inline(always)]
     pub(super) fn at_least(self, low: F32s<V>) -> F32s<V> {
-        self.with(self.eight.max_f32s(self.x, low.x))
+        self.with(self.eight.greater(self.x, low.x))
     }
 
     /// The lesser numbers; those of `high` for NaN.
     #[inline(always)]
     pub(super) fn at_most(self, high: F32s<V>) -> F32s<V> {
-        self.with(self.eight.min_f32s(self.x, high.x))
+        self.with(self.eight.lesser(self.x, high.x))
     }
 
+    /// The greatest of all.
     #[inline(always)]
     pub(super) fn greatest(self) -> f32 {
-        self.eight.reduce_max_f32s(self.x)
+        self.eight.greatest(self.x)
     }
 
     #[inline(always)]
