@@ -194,6 +194,17 @@ mod tests {
     }
 
     #[test]
+    fn errors_of_colors_are_means_over_three_channels() {
+        for channel in 0..3 {
+            let image = changed(UVec2::new(7, 31), channel, 0.25);
+            let e = color_errors(&opaque(&image), &opaque(&reference())).unwrap();
+            assert!((e.rmse - 0.25 / 6000.0f64.sqrt()).abs() < 1e-7, "{channel}: {}", e.rmse);
+        }
+        let image = changed(UVec2::new(7, 31), 3, 0.25);
+        assert!(color_errors(&opaque(&image), &opaque(&reference())).unwrap().rmse < 1e-7);
+    }
+
+    #[test]
     fn every_channel_counts_alpha_included() {
         for channel in 0..4 {
             let e = errors(&changed(UVec2::new(7, 31), channel, 0.25), &reference()).unwrap();

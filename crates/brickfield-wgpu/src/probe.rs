@@ -45,6 +45,10 @@ fn noise(device: &Device, work: &TextureWork) -> Result<wgpu::Texture, RenderErr
     if is_filtered_float && !device.has(Features::FLOAT32_FILTERABLE) {
         return Err(RenderError::Unsupported { what: "filter 32-bit floats in hardware (FLOAT32_FILTERABLE)" });
     }
+    let limit = device.description.capabilities.max_texels(work.fetch.layout());
+    if work.texels.max_element() > limit {
+        return Err(RenderError::TextureTooLarge { texels: work.texels, limit });
+    }
     let (format, [x, y, z]) = (stored_as(device, work.format)?, work.texels.to_array());
     let layer_bytes = x as usize * y as usize * work.format.n_bytes();
     device.checked("a texture", layer_bytes as u64 * u64::from(z), || {
