@@ -1,6 +1,4 @@
 //! Samples of one brick in f32: eight nodes of a ray at a time.
-//!
-//! Indices are held below a bound that the compiler knows, so that no bounds check is left.
 
 use super::eight::{Eight, F32s, LANES, U32s};
 

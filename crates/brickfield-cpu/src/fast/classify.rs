@@ -14,7 +14,7 @@ pub(crate) struct Optics32 {
 
 /// A stretch of values in which the transfer function is linear.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stretch {
+struct Stretch {
     start: f32,
     /// Reciprocal of the stretch's length; 0 where the function is constant.
     reciprocal: f32,
@@ -43,7 +43,7 @@ pub(crate) struct Classifier {
 /// Four times as many as transfer functions mostly have knots: the stretch that a bin names is mostly a value's, or the one before.
 const N_BINS: usize = 1024;
 
-/// Eight stretches, number by number, so that a register holds one number of all. Those that are left are as the last.
+/// At most eight stretches, number by number: a register holds the starts of all, another one the ends. Behind the last, its numbers repeat.
 #[derive(Clone, Debug)]
 struct FewStretches {
     starts: [f32; LANES],

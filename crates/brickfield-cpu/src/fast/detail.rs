@@ -29,7 +29,7 @@ impl<'a, const N: usize> Sieve<'a, N> {
         Sieve { nodes, far, distances: &distances[..Self::N_MACROCELLS.pow(3)] }
     }
 
-    /// Which of eight segments from `first` on may see something, as bits, by the places of their nodes; and the first one behind them that may.
+    /// Looks at eight segments from `first` on, by the places of their nodes: a bit for each that may see something, and where the search goes on.
     #[inline(always)]
     pub(super) fn find<V: Eight>(&self, first: i32, near: &Places<V>, far: Option<&Places<V>>) -> (u8, i32) {
         let (macrocells, distances) = self.look_up(near);

@@ -20,15 +20,6 @@ pub(super) trait Eight: Simd<f32s = f32x8, u32s = u32x8, m32s = m32x8> {
     /// a b + c, rounded once where the processor can.
     fn times_plus(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8;
 
-    /// The greater numbers; those of `b` where one is NaN.
-    fn greater(self, a: f32x8, b: f32x8) -> f32x8;
-
-    /// The lesser numbers; those of `b` where one is NaN.
-    fn lesser(self, a: f32x8, b: f32x8) -> f32x8;
-
-    /// The greatest number.
-    fn greatest(self, x: f32x8) -> f32;
-
     /// Integers below 2^31 as numbers.
     fn of_integers(self, integers: u32x8) -> f32x8;
 
@@ -49,21 +40,6 @@ impl Eight for pulp::x86::V3 {
     #[inline(always)]
     fn times_plus(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8 {
         self.mul_add_f32x8(a, b, c)
-    }
-
-    #[inline(always)]
-    fn greater(self, a: f32x8, b: f32x8) -> f32x8 {
-        self.max_f32s(a, b)
-    }
-
-    #[inline(always)]
-    fn lesser(self, a: f32x8, b: f32x8) -> f32x8 {
-        self.min_f32s(a, b)
-    }
-
-    #[inline(always)]
-    fn greatest(self, x: f32x8) -> f32 {
-        self.reduce_max_f32s(x)
     }
 
     #[inline(always)]
@@ -105,35 +81,6 @@ impl Eight for Scalar256b {
             };
         }
         cast(sums)
-    }
-
-    #[inline(always)]
-    fn greater(self, a: f32x8, b: f32x8) -> f32x8 {
-        let (a, mut b): ([f32; LANES], [f32; LANES]) = (cast(a), cast(b));
-        for l in 0..LANES {
-            b[l] = if a[l] > b[l] { a[l] } else { b[l] };
-        }
-        cast(b)
-    }
-
-    #[inline(always)]
-    fn lesser(self, a: f32x8, b: f32x8) -> f32x8 {
-        let (a, mut b): ([f32; LANES], [f32; LANES]) = (cast(a), cast(b));
-        for l in 0..LANES {
-            b[l] = if a[l] < b[l] { a[l] } else { b[l] };
-        }
-        cast(b)
-    }
-
-    #[inline(always)]
-    fn greatest(self, x: f32x8) -> f32 {
-        let mut x: [f32; LANES] = cast(x);
-        for half in [4, 2, 1] {
-            for l in 0..half {
-                x[l] = if x[l + half] > x[l] { x[l + half] } else { x[l] };
-            }
-        }
-        x[0]
     }
 
     #[inline(always)]
@@ -229,19 +176,19 @@ impl<V: Eight> F32s<V> {
     /// The greater numbers; those of `low` for NaN.
     #[inline(always)]
     pub(super) fn at_least(self, low: F32s<V>) -> F32s<V> {
-        self.with(self.eight.greater(self.x, low.x))
+        self.with(self.eight.max_f32s(self.x, low.x))
     }
 
     /// The lesser numbers; those of `high` for NaN.
     #[inline(always)]
     pub(super) fn at_most(self, high: F32s<V>) -> F32s<V> {
-        self.with(self.eight.lesser(self.x, high.x))
+        self.with(self.eight.min_f32s(self.x, high.x))
     }
 
     /// The greatest of all.
     #[inline(always)]
     pub(super) fn greatest(self) -> f32 {
-        self.eight.greatest(self.x)
+        self.eight.reduce_max_f32s(self.x)
     }
 
     #[inline(always)]
@@ -372,9 +319,8 @@ impl<V: Eight> U32s<V> {
     /// One less for those under a mask.
     #[inline(always)]
     pub(super) fn less_one(self, mask: Mask) -> U32s<V> {
-        // All bits are -1.
-        let ones = self.eight.transmute_u32s_m32s(mask.0);
-        U32s { x: self.eight.add_u32s(self.x, ones), ..self }
+        // All bits of a word are -1.
+        self + U32s { x: self.eight.transmute_u32s_m32s(mask.0), ..self }
     }
 
     #[inline(always)]
@@ -390,9 +336,8 @@ impl<V: Eight> U32s<V> {
     /// Each one nearer to another, unless it is there.
     #[inline(always)]
     pub(super) fn one_towards(self, to: U32s<V>) -> U32s<V> {
-        let bits = |mask: Mask| U32s { x: self.eight.transmute_u32s_m32s(mask.0), ..self };
-        // All bits are -1.
-        self - bits(self.is_less(to)) + bits(to.is_less(self))
+        let one = |mask: Mask| self - self.less_one(mask);
+        self + one(self.is_less(to)) - one(to.is_less(self))
     }
 
     /// Integers below 2^31 as numbers.

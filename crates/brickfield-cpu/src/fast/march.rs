@@ -161,9 +161,8 @@ fn along_blocks<const N: usize, S: Stored>(
     loop {
         let n = ((walk.exit - far).ceil() - k as f64).min((to - k).min(MOST) as f64) as i32;
         if n > 0 {
-            if let Some((slot, reach, corner)) = walk.resident() {
-                let level = reach.level_of_brick();
-                Resident { slot, level, corner }.run(plan32, path, k, (near, far), n, waiting);
+            if let Some(resident) = walk.resident() {
+                resident.run(plan32, path, k, (near, far), n, waiting);
             }
             k += i64::from(n);
             if k < to && k as f64 + far < walk.exit {
@@ -255,11 +254,11 @@ pub(super) fn nodes_of<T>(
 }
 
 /// A brick in a slot.
-struct Resident {
-    slot: u32,
-    level: Level,
+pub(super) struct Resident {
+    pub(super) slot: u32,
+    pub(super) level: Level,
     /// Where it begins in sample space.
-    corner: DVec3,
+    pub(super) corner: DVec3,
 }
 
 impl Resident {

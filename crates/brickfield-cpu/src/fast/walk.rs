@@ -5,7 +5,7 @@ use brickfield_frame::{IndexEntry, Reach};
 
 use super::brick::Stored;
 use super::f32_plan::F32Plan;
-use super::march::Path;
+use super::march::{Path, Resident};
 
 /// Where the outermost blocks end: nowhere. (A number, so that 0 times it is 0.)
 const NOWHERE: f64 = 1e300;
@@ -92,7 +92,7 @@ impl<'a, const N: usize, S: Stored> Walk<'a, N, S> {
         self.exit = x.min(y).min(z);
     }
 
-    /// Goes on to the next block, or at least to that which holds a point of the path behind this block.
+    /// Goes on to the next block; behind a block of several cells, to the block of a point of the path.
     #[inline(always)]
     pub(super) fn leave(&mut self, at: f64) {
         if self.entry.reach() != Reach(0) {
@@ -108,11 +108,11 @@ impl<'a, const N: usize, S: Stored> Walk<'a, N, S> {
         self.enter();
     }
 
-    /// The brick in the block's slot, how far it reaches, and its lower corner in sample space; `None` if the block is empty.
+    /// The block's brick; `None` if the block is empty.
     #[inline(always)]
-    pub(super) fn resident(&self) -> Option<(u32, Reach, DVec3)> {
+    pub(super) fn resident(&self) -> Option<Resident> {
         let IndexEntry::Resident { slot, reach } = self.entry else { return None };
         let [x, y, z] = self.cell.map(|cell| (cell >> reach.0 << reach.0) as f64);
-        Some((slot, reach, DVec3::new(x, y, z) * (N - 1) as f64))
+        Some(Resident { slot, level: reach.level_of_brick(), corner: DVec3::new(x, y, z) * (N - 1) as f64 })
     }
 }
